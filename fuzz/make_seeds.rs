@@ -1,0 +1,168 @@
+//! Writes the seed corpora: a few small inputs per target, made by our own encoders.
+//!
+//! `cargo run --example make_seeds` in this folder; the seeds lie in `seeds/TARGET`.
+
+use std::fs;
+use std::io::Result;
+use std::path::Path;
+
+use hachi_robosense::encode as helios;
+use hachi_robosense::packet as helios_packet;
+use hachi_velodyne::encode as vlp16;
+use hachi_velodyne::packet as vlp16_packet;
+
+const SENTENCE: &[u8] = b"$GPRMC,120000.00,A,4807.038,N,01131.000,E,000.0,000.0,221126,,,A*5B\r\n";
+
+fn vlp16_data(mode: vlp16_packet::ReturnMode) -> Vec<u8> {
+    let stride = if mode == vlp16_packet::ReturnMode::Dual {
+        2
+    } else {
+        1
+    };
+    let blocks = std::array::from_fn(|k| vlp16::Block {
+        azimuth: (k / stride * 40) as u16,
+        echoes: std::array::from_fn(|j| vlp16::Echo {
+            distance: 1_000 + (k * 32 + j) as u16,
+            reflectivity: j as u8,
+        }),
+    });
+    vlp16::data_packet(&blocks, 3_599_999_000, mode, vlp16_packet::Model::Vlp16).to_vec()
+}
+
+fn helios_msop() -> Vec<u8> {
+    let blocks = std::array::from_fn(|k| helios::Block {
+        azimuth: k as u16 * 20,
+        echoes: std::array::from_fn(|j| helios::Echo {
+            distance: 1_000 + (k * 32 + j) as u16,
+            intensity: j as u8,
+        }),
+    });
+    helios::msop_packet(&blocks, 1, 1_483_724_884_000_000).to_vec()
+}
+
+fn helios_difop() -> Vec<u8> {
+    helios::difop_packet(&helios::DifopContents {
+        rpm: 600,
+        return_mode: helios_packet::ReturnMode::Strongest,
+        sync_source: helios_packet::SyncSource::Gps,
+        sync_status: helios_packet::SyncStatus::Gps,
+        time_us: 1_483_724_884_000_000,
+        calibration: Some(helios_packet::Calibration::nominal()),
+    })
+    .to_vec()
+}
+
+/// An IPv4 datagram to port 2368 with four bytes, or one of two fragments of it.
+fn ipv4(flags_and_offset: u16, part: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0x45, 0, 0, 20 + part.len() as u8, 0, 9];
+    bytes.extend(flags_and_offset.to_be_bytes());
+    bytes.extend([64, 17, 0, 0, 192, 168, 1, 201, 255, 255, 255, 255]);
+    bytes.extend(part);
+    bytes
+}
+
+const UDP: [u8; 12] = [9, 64, 9, 64, 0, 12, 0, 0, 1, 2, 3, 4];
+
+fn pcap(link: u32, frames: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = 0xA1B2_3C4D_u32.to_le_bytes().to_vec();
+    bytes.extend([2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0, 0]);
+    bytes.extend(link.to_le_bytes());
+    for frame in frames {
+        for word in [100, 0, frame.len() as u32, frame.len() as u32] {
+            bytes.extend(word.to_le_bytes());
+        }
+        bytes.extend(frame);
+    }
+    bytes
+}
+
+fn pcapng(frame: &[u8]) -> Vec<u8> {
+    let block = |kind: u32, body: &[u8]| {
+        let mut padded = body.to_vec();
+        padded.resize(body.len().next_multiple_of(4), 0);
+        let len = (12 + padded.len() as u32).to_le_bytes();
+        [&kind.to_le_bytes()[..], &len, &padded, &len].concat()
+    };
+    let mut section = vec![0x4D, 0x3C, 0x2B, 0x1A, 1, 0, 0, 0];
+    section.extend([0xFF; 8]);
+    let interface = [101, 0, 0, 0, 0, 0, 0, 0, 9, 0, 1, 0, 9, 0, 0, 0, 0, 0, 0, 0];
+    let mut packet = [[0; 4], [0; 4], [5; 4]].concat();
+    packet.extend((frame.len() as u32).to_le_bytes());
+    packet.extend((frame.len() as u32).to_le_bytes());
+    packet.extend(frame);
+    [
+        block(0x0A0D_0D0A, &section),
+        block(1, &interface),
+        block(6, &packet),
+    ]
+    .concat()
+}
+
+/// Commands for the scan targets: many unchanged packets 1.3 ms (0.7 ms) apart, then `packet`
+/// whole, then some more.
+fn stream(ticks: u8, packet: &[u8]) -> Vec<u8> {
+    let go_on = [0, 32 + ticks].repeat(100);
+    let len = (packet.len() as u16).to_be_bytes();
+    let mut bytes = vec![0, 0];
+    bytes.extend(&go_on);
+    bytes.extend([0xFF, 32 + ticks]);
+    bytes.extend(len);
+    bytes.extend(packet);
+    bytes.extend(&go_on);
+    bytes
+}
+
+fn with_switches(switches: u8, payload: Vec<u8>) -> Vec<u8> {
+    [vec![switches], payload].concat()
+}
+
+fn main() -> Result<()> {
+    use vlp16_packet::ReturnMode::{Dual, Strongest};
+    let position = vlp16_packet::PositionPacket::new(77, vlp16_packet::Pps::Locked, SENTENCE);
+    let position = vlp16::position_packet(&position).to_vec();
+    let ethernet = [vec![1; 12], vec![8, 0], ipv4(0, &UDP)].concat();
+    let fragments = [ipv4(0x2000, &UDP[..8]), ipv4(1, &UDP[8..])];
+    let seeds: [(&str, Vec<Vec<u8>>); 8] = [
+        (
+            "velodyne_packet",
+            vec![
+                with_switches(0, vlp16_data(Strongest)),
+                with_switches(3, vlp16_data(Dual)),
+            ],
+        ),
+        ("velodyne_position", vec![position.clone()]),
+        (
+            "velodyne_scans",
+            vec![stream(13, &vlp16_data(Dual)), stream(13, &position)],
+        ),
+        ("robosense_msop", vec![with_switches(0, helios_msop())]),
+        ("robosense_difop", vec![helios_difop()]),
+        (
+            "robosense_scans",
+            vec![stream(7, &helios_difop()), stream(7, &helios_msop())],
+        ),
+        (
+            "capture",
+            vec![
+                pcap(1, &[ethernet]),
+                pcap(101, &fragments),
+                pcapng(&ipv4(0, &UDP)),
+            ],
+        ),
+        (
+            "nmea",
+            vec![
+                SENTENCE.to_vec(),
+                b"GPGGA,123519.5,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,".to_vec(),
+            ],
+        ),
+    ];
+    for (target, inputs) in seeds {
+        let folder = Path::new("seeds").join(target);
+        fs::create_dir_all(&folder)?;
+        for (number, bytes) in inputs.iter().enumerate() {
+            fs::write(folder.join(number.to_string()), bytes)?;
+        }
+    }
+    Ok(())
+}

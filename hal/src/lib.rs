@@ -1,0 +1,43 @@
+//! What a robot is, with no robot named: the plain data that sensors produce and the traits that
+//! devices implement.
+//!
+//! `no_std`, no allocation in the default features. Everything else in Hachi depends on this crate
+//! and this crate depends on nothing of Hachi's. Frames follow REP-103 and REP-105 (x forward,
+//! y left, z up; `map -> odom -> base -> {lidar, imu, footprint}`); a transform `map_from_base`
+//! takes points in `base` to `map`.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`time`] | [`Stamp`]: integer nanoseconds on the robot's clock |
+//! | [`point`] | [`Point`]: one LiDAR return; [`PointSink`]: where decoders put them |
+//! | [`scan`] | [`ScanHeader`]: one turn of a LiDAR |
+//! | [`geometry`] | [`Pose`] and friends |
+//! | [`imu`], [`motion`] | inertial samples, external odometry |
+//! | [`device`] | the device traits and [`FaultKind`] |
+//! | `mock`, `conformance` | scripted devices; each trait's promise as a check (features) |
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
+pub mod device;
+pub mod geometry;
+pub mod imu;
+pub mod motion;
+pub mod point;
+pub mod scan;
+pub mod time;
+
+#[cfg(feature = "conformance")]
+pub mod conformance;
+#[cfg(feature = "mock")]
+pub mod mock;
+
+pub use device::{Clock, DeviceError, FaultKind, Imu, LidarScans, PacketSource, Received};
+pub use geometry::{Pose, Rotation, Vector3};
+pub use imu::ImuSample;
+pub use motion::OdometrySample;
+pub use point::{Point, PointSink, ReturnKind, SinkFull};
+pub use scan::{Completeness, ScanHeader};
+pub use time::Stamp;

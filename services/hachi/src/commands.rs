@@ -1,0 +1,26 @@
+//! One module for each command: arguments in, files and a summary out.
+
+pub mod decode;
+pub mod demo;
+pub mod doctor;
+pub mod eval_registration;
+pub mod eval_trajectory;
+pub mod replay;
+
+use crate::cli::{Command, Eval};
+use crate::exit::Failure;
+
+/// Runs a command.
+///
+/// # Errors
+/// What the command could not do, and what the user can.
+pub fn dispatch(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Decode(arguments) => decode::run(&arguments),
+        Command::Replay(arguments) => replay::run(&arguments),
+        Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
+        Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
+    }
+}

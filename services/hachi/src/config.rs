@@ -1,0 +1,257 @@
+//! Settings of the mapping pipeline: `hachi.toml` over the platform's file over the defaults.
+//!
+//! Every stage owns its own section; keys that nobody knows are refused with their place in the
+//! file. Angles are degrees here and radians inside.
+
+use std::path::Path;
+
+use hachi_cloud::FilterConfig;
+use hachi_hal::{Pose, Rotation, Vector3};
+use hachi_odometry::OdometryConfig;
+use serde::{Deserialize, Serialize};
+
+use crate::exit::Failure;
+
+/// What is known of the motion besides the scans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MotionInput {
+    /// Nothing.
+    #[default]
+    None,
+    /// The recording's inertial samples; needs `lidar_from_imu`.
+    Imu,
+    /// The recording's odometry, of the base; needs the mount.
+    Odometry,
+}
+
+/// Where something sits on something else.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mount {
+    /// Metres: forward, left, up.
+    pub xyz_m: [f64; 3],
+    /// Roll, pitch, yaw (applied yaw first), degrees.
+    pub rpy_deg: [f64; 3],
+}
+
+impl Mount {
+    /// The transform.
+    pub fn pose(&self) -> Pose {
+        let [r, p, y] = self.rpy_deg.map(f64::to_radians);
+        Pose::from_parts(
+            Vector3::from(self.xyz_m).into(),
+            Rotation::from_euler_angles(r, p, y),
+        )
+    }
+}
+
+/// Settings of the map that is written.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MapConfig {
+    /// Edge of the cubes of which each gives one point.
+    pub voxel_m: f64,
+}
+
+impl Default for MapConfig {
+    fn default() -> Self {
+        Self { voxel_m: 0.05 }
+    }
+}
+
+/// Settings of the mapping pipeline.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MappingConfig {
+    /// Where the LiDAR sits on the robot's base.
+    pub base_from_lidar: Mount,
+    /// Where the IMU sits on the LiDAR; only its rotation matters.
+    pub lidar_from_imu: Mount,
+    /// What is known of the motion besides the scans.
+    pub motion: MotionInput,
+    /// Filters.
+    pub filter: FilterConfig,
+    /// Odometry.
+    pub odometry: OdometryConfig,
+    /// The map.
+    pub map: MapConfig,
+}
+
+/// Platforms with their settings, each over the defaults.
+const PLATFORMS: [(&str, &str); 3] = [
+    ("b1", include_str!("../../../config/b1.toml")),
+    ("go1", include_str!("../../../config/go1.toml")),
+    ("kairos", include_str!("../../../config/kairos.toml")),
+];
+
+impl MappingConfig {
+    /// The settings of a platform (or none) with those of a file (or none) over them.
+    ///
+    /// # Errors
+    /// No such platform; the file can't be read, or says something that is not understood.
+    pub fn load(platform: Option<&str>, file: Option<&Path>) -> Result<Self, Failure> {
+        let mut table = toml::Table::new();
+        if let Some(name) = platform {
+            let text = PLATFORMS
+                .iter()
+                .find(|(n, _)| *n == name)
+                .map(|(_, text)| *text);
+            let text = text.ok_or_else(|| {
+                let known = PLATFORMS.map(|(n, _)| n).join(", ");
+                Failure::new(
+                    format_args!("there is no platform {name:?}"),
+                    format_args!("choose one of {known}, or leave --platform out"),
+                )
+            })?;
+            merge(&mut table, parse(text, name)?);
+        }
+        if let Some(path) = file {
+            let text = std::fs::read_to_string(path).map_err(|error| {
+                Failure::new(
+                    format_args!("{} can't be read: {error}", path.display()),
+                    "give the path of a TOML file",
+                )
+            })?;
+            // Checked on its own first: only then does the error know the line.
+            let name = path.display().to_string();
+            toml::from_str::<Self>(&text).map_err(|error| wrong(&name, &error))?;
+            merge(&mut table, parse(&text, &name)?);
+        }
+        let mut config: Self = table
+            .try_into()
+            .map_err(|error| wrong("the settings", &error))?;
+        config.odometry.base_from_lidar = config.base_from_lidar.pose();
+        config.odometry.lidar_from_imu = config.lidar_from_imu.pose().rotation;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Refuses what no stage can work with.
+    fn check(&self) -> Result<(), Failure> {
+        self.filter
+            .check()
+            .map_err(|error| Failure::new(error, "correct the [filter] section"))?;
+        let odometry = &self.odometry;
+        let positive = [
+            ("odometry.target_points", odometry.target_points as f64),
+            (
+                "odometry.cell_m",
+                f64::from(odometry.cell_m.unwrap_or(f32::MIN_POSITIVE)),
+            ),
+            ("odometry.map_range_m", f64::from(odometry.map_range_m)),
+            ("odometry.knot_interval_s", odometry.knot_interval_s),
+            (
+                "odometry.agility.acceleration",
+                odometry.agility.acceleration,
+            ),
+            (
+                "odometry.agility.angular_acceleration",
+                odometry.agility.angular_acceleration,
+            ),
+            (
+                "odometry.degeneracy_threshold",
+                odometry.degeneracy_threshold,
+            ),
+            ("odometry.lost_after", odometry.lost_after as f64),
+            (
+                "odometry.gyro_noise_rad_per_s",
+                odometry.gyro_noise_rad_per_s,
+            ),
+            (
+                "odometry.odometry_error_share",
+                odometry.odometry_error_share,
+            ),
+            ("map.voxel_m", self.map.voxel_m),
+        ];
+        for (key, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Failure::new(
+                    format_args!("{key} = {value} can't work"),
+                    "give a finite number above 0",
+                ));
+            }
+        }
+        for (name, mount) in [
+            ("base_from_lidar", &self.base_from_lidar),
+            ("lidar_from_imu", &self.lidar_from_imu),
+        ] {
+            for (key, values) in [("xyz_m", mount.xyz_m), ("rpy_deg", mount.rpy_deg)] {
+                // Farther than any robot is long: a slip of the unit, and then of every pose.
+                if !values.iter().all(|v| v.abs() < 1e3) {
+                    return Err(Failure::new(
+                        format_args!("{name}.{key} = {values:?} can't work"),
+                        "give three finite numbers below 1000",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn parse(text: &str, name: &str) -> Result<toml::Table, Failure> {
+    text.parse::<toml::Table>()
+        .map_err(|error| wrong(name, &error))
+}
+
+fn wrong(name: &str, error: &toml::de::Error) -> Failure {
+    let message = error
+        .to_string()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
+    Failure::new(
+        format_args!("{name} is not understood: {message}"),
+        "correct that line; docs/configuration.md lists every key",
+    )
+}
+
+/// Puts `over` on top of `table`, section by section.
+fn merge(table: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (table.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => merge(below, above),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_platform_s_file_is_understood() {
+        for (name, _) in PLATFORMS {
+            let config = MappingConfig::load(Some(name), None).unwrap();
+            assert!(!config.filter.body.is_empty(), "{name} has no body to crop");
+        }
+    }
+
+    #[test]
+    fn a_key_nobody_knows_is_refused_with_its_line() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "[odometry]\ntarget_point = 5\n").unwrap();
+        let error = MappingConfig::load(None, Some(file.path()))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("line 2") && error.contains("target_point"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_file_goes_over_the_platform_key_by_key() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "[filter]\nfar_m = 33.0\n").unwrap();
+        let platform = MappingConfig::load(Some("go1"), None).unwrap();
+        let config = MappingConfig::load(Some("go1"), Some(file.path())).unwrap();
+        assert_eq!(config.filter.far_m, 33.0);
+        assert_eq!(config.filter.body, platform.filter.body);
+        assert!(MappingConfig::load(Some("go9"), None).is_err());
+    }
+}

@@ -1,0 +1,49 @@
+//! Hachi's program as a library, so that tests drive whole pipelines in their own process.
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`cli`] | the command line, word for word |
+//! | [`commands`] | one module for each command |
+//! | [`exit`] | how a command fails, and the exit status |
+//! | [`output`] | standard output: figures for people, one JSON object for programs |
+//! | [`interrupt`] | Ctrl-C: a flag that long work looks at between scans |
+//! | [`progress`] | progress on a terminal |
+//! | [`report`], [`latency`] | `report.json`, and the times that go into it |
+//! | [`log`] | logging |
+//! | [`mapping`] | the flow from scans to trajectory and map: read it first |
+//! | [`recording`], [`motion_samples`] | recordings of any kind as scans and samples |
+//! | [`config`] | settings |
+//! | [`map_builder`], [`map_picture`] | the map that people look at |
+//! | [`results`] | the files of a run |
+
+pub mod cli;
+pub mod commands;
+pub mod config;
+pub mod exit;
+pub mod interrupt;
+pub mod latency;
+pub mod log;
+pub mod map_builder;
+pub mod map_picture;
+pub mod mapping;
+pub mod motion_samples;
+pub mod output;
+pub mod progress;
+pub mod recording;
+pub mod report;
+pub mod results;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Runs the program with these arguments (the first is its name); says errors on standard error.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match cli::Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => return exit::usage(&error),
+    };
+    let outcome = log::start(cli.log.as_deref()).and_then(|()| commands::dispatch(cli.command));
+    exit::status(outcome)
+}

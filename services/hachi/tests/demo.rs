@@ -1,0 +1,125 @@
+//! `hachi demo` as a new user runs it, only shorter.
+
+mod program;
+
+use program::{hachi, names, run, text, tum, whole_results};
+
+#[test]
+fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("demo");
+    let run = run(&["demo", "--seconds", "8", "--headless", "--out", text(&out)]);
+    assert!(
+        run.success().contains("error against the truth"),
+        "{}",
+        run.stdout
+    );
+    let report = whole_results(&out);
+    assert_eq!(report["state"], "finished");
+    // Ten turns a second; the last one may be cut.
+    assert!(
+        (79..=81).contains(&report["scans"].as_u64().unwrap()),
+        "{report}"
+    );
+    assert!(
+        report["true_path_length_m"].as_f64().unwrap() > 4.0,
+        "{report}"
+    );
+    assert!(report["ate_rmse_m"].as_f64().unwrap() < 0.08, "{report}");
+    assert_eq!(report["conditions"]["lost"], 0, "{report}");
+
+    // The figure of the report, measured once more from the files.
+    let evaluated = program::run(&[
+        "eval",
+        "trajectory",
+        "--reference",
+        text(&out.join("truth.tum")),
+        "--estimate",
+        text(&out.join("trajectory.tum")),
+        "--align",
+        "se3",
+        "--json",
+    ])
+    .json();
+    let (here, there) = (&evaluated["ape"]["rmse"], &report["ate_rmse_m"]);
+    assert!(
+        (here.as_f64().unwrap() - there.as_f64().unwrap()).abs() < 1e-6,
+        "{here} {there}"
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_walk_and_json_is_all_there_is_on_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let walk = |name: &str, seed: &str| {
+        let out = folder.path().join(name);
+        let arguments = [
+            "demo",
+            "--seconds",
+            "1",
+            "--headless",
+            "--json",
+            "--seed",
+            seed,
+        ];
+        let output = hachi()
+            .args(arguments)
+            .arg("--out")
+            .arg(&out)
+            .output()
+            .unwrap();
+        let json = program::finished(output).json();
+        assert_eq!(json, program::report(&out));
+        std::fs::read(out.join("trajectory.tum")).unwrap()
+    };
+    let first = walk("a", "7");
+    assert_eq!(first, walk("b", "7"));
+    assert_ne!(first, walk("c", "8"));
+}
+
+#[test]
+fn the_other_sensor_walks_too_and_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "demo",
+        "--seconds",
+        "1",
+        "--headless",
+        "--sensor",
+        "helios16p",
+        "--out",
+    ];
+    let run = run(&[&arguments[..], &[text(folder.path())]].concat());
+    assert!(run.success().starts_with("RS-Helios-16P"), "{}", run.stdout);
+    assert!((9..=11).contains(&whole_results(folder.path())["scans"].as_u64().unwrap()));
+}
+
+#[test]
+fn a_walk_too_short_to_measure_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("demo");
+    let run = run(&["demo", "--seconds", "0", "--headless", "--out", text(&out)]);
+    assert!(run.failure().contains("--seconds"), "{}", run.stderr);
+    assert!(names(&out).iter().all(|name| !name.starts_with('.')));
+}
+
+#[test]
+fn what_the_help_calls_results_is_there_and_nothing_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("deep/er/demo");
+    run(&["demo", "--seconds", "1", "--headless", "--out", text(&out)]).success();
+    assert_eq!(
+        names(&out),
+        [
+            "loops.csv",
+            "map.ply",
+            "map.png",
+            "odometry.tum",
+            "report.json",
+            "trajectory.svg",
+            "trajectory.tum",
+            "truth.tum"
+        ]
+    );
+    assert!(tum(&out.join("truth.tum")).len() >= 9);
+}

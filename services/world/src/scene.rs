@@ -1,0 +1,352 @@
+//! A scene: solids with materials, and what a ray hits first.
+//!
+//! In: what [`SceneBuilder`](crate::SceneBuilder) was told. Out: the nearest hit of a ray. The bounding-volume tree and
+//! the intersection with boxes and triangles are parry's; its types stay inside this crate.
+//! Elsewhere: materials (`material`), the buildings themselves (`building`).
+//!
+//! Inside, coordinates are `f32`: a building of 100 m is resolved to 8 µm.
+
+use hachi_hal::Vector3;
+use parry3d::bounding_volume::Aabb;
+use parry3d::math::{Pose as ParryPose, Vector};
+use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d::query::{Ray, RayCast};
+use parry3d::shape::{Cuboid, Triangle};
+
+use crate::floor::Floor;
+use crate::material::Material;
+use crate::optics::brightness;
+
+/// Numbers the objects of a scene in the order in which they were added.
+pub type ObjectId = u32;
+
+/// What an object is to the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Walls, furniture, everything that stands or hangs.
+    Structure,
+    /// What one walks on.
+    Floor,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Object {
+    pub material: Material,
+    pub role: Role,
+}
+
+#[derive(Debug)]
+pub(crate) enum Shape {
+    AxisBox(Aabb),
+    Box {
+        world_from_box: ParryPose,
+        cuboid: Cuboid,
+    },
+    /// Upright. Solved in closed form: parry casts cylinders by an iterative search.
+    Cylinder {
+        base: Vector,
+        radius: f32,
+        height: f32,
+    },
+    Triangle(Triangle),
+}
+
+impl Shape {
+    fn bounds(&self) -> Aabb {
+        match self {
+            Self::AxisBox(bounds) => *bounds,
+            Self::Box {
+                world_from_box,
+                cuboid,
+            } => cuboid.aabb(world_from_box),
+            Self::Cylinder {
+                base,
+                radius,
+                height,
+            } => Aabb::new(
+                *base - Vector::new(*radius, *radius, 0.0),
+                *base + Vector::new(*radius, *radius, *height),
+            ),
+            Self::Triangle(triangle) => triangle.local_aabb(),
+        }
+    }
+
+    fn distance(&self, ray: &Ray, within: f32) -> Option<f32> {
+        match self {
+            Self::AxisBox(bounds) => bounds.cast_local_ray(ray, within, true),
+            Self::Box {
+                world_from_box,
+                cuboid,
+            } => cuboid.cast_ray(world_from_box, ray, within, true),
+            Self::Cylinder {
+                base,
+                radius,
+                height,
+            } => cylinder_hit(*base, *radius, *height, ray).map(|(distance, _)| distance),
+            Self::Triangle(triangle) => triangle.cast_local_ray(ray, within, true),
+        }
+    }
+
+    /// The normal where the ray hits; zero if it starts inside or misses.
+    fn normal(&self, ray: &Ray, within: f32) -> Vector {
+        let hit = match self {
+            Self::AxisBox(bounds) => bounds.cast_local_ray_and_get_normal(ray, within, true),
+            Self::Box {
+                world_from_box,
+                cuboid,
+            } => cuboid.cast_ray_and_get_normal(world_from_box, ray, within, true),
+            Self::Cylinder {
+                base,
+                radius,
+                height,
+            } => {
+                return cylinder_hit(*base, *radius, *height, ray)
+                    .map_or(Vector::ZERO, |(_, normal)| normal);
+            }
+            Self::Triangle(triangle) => triangle.cast_local_ray_and_get_normal(ray, within, true),
+        };
+        hit.map_or(Vector::ZERO, |hit| hit.normal)
+    }
+}
+
+/// Distance and normal where a ray from outside enters an upright cylinder.
+fn cylinder_hit(base: Vector, radius: f32, height: f32, ray: &Ray) -> Option<(f32, Vector)> {
+    let from = ray.origin - base;
+    let dir = ray.dir;
+    let a = dir.x * dir.x + dir.y * dir.y;
+    let mut side = None;
+    if a > 1e-12 {
+        let half_b = from.x * dir.x + from.y * dir.y;
+        let c = from.x * from.x + from.y * from.y - radius * radius;
+        let discriminant = half_b * half_b - a * c;
+        if discriminant < 0.0 {
+            return None;
+        }
+        let distance = (-half_b - discriminant.sqrt()) / a;
+        let z = from.z + distance * dir.z;
+        if distance >= 0.0 && (0.0..=height).contains(&z) {
+            let normal = Vector::new(
+                (from.x + distance * dir.x) / radius,
+                (from.y + distance * dir.y) / radius,
+                0.0,
+            );
+            side = Some((distance, normal));
+        }
+    }
+    let cap_z = if dir.z < 0.0 { height } else { 0.0 };
+    let cap = (cap_z - from.z) / dir.z;
+    let (x, y) = (from.x + cap * dir.x, from.y + cap * dir.y);
+    if cap >= 0.0 && x * x + y * y <= radius * radius && side.is_none_or(|(d, _)| cap < d) {
+        return Some((cap, Vector::new(0.0, 0.0, -dir.z.signum())));
+    }
+    side
+}
+
+#[derive(Debug)]
+pub(crate) struct Primitive {
+    pub shape: Shape,
+    pub object: ObjectId,
+}
+
+/// Where a ray met something.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Hit {
+    pub distance: f32,
+    /// Unit; towards either side of the surface.
+    pub normal: Vector,
+    pub object: ObjectId,
+}
+
+/// Solids with materials, and the floor that one walks on.
+#[derive(Debug)]
+pub struct Scene {
+    primitives: Vec<Primitive>,
+    objects: Vec<Object>,
+    tree: Bvh,
+    floor: Floor,
+    brightest: f32,
+}
+
+impl Scene {
+    pub(crate) fn new(primitives: Vec<Primitive>, objects: Vec<Object>, floor: Floor) -> Self {
+        let bounds: Vec<Aabb> = primitives
+            .iter()
+            .map(|primitive| primitive.shape.bounds())
+            .collect();
+        Self {
+            brightest: objects
+                .iter()
+                .map(|object| brightness(&object.material))
+                .fold(0.0, f32::max),
+            tree: Bvh::from_leaves(BvhBuildStrategy::Ploc, &bounds),
+            primitives,
+            objects,
+            floor,
+        }
+    }
+
+    /// The most that any surface scatters back, in units of a white target.
+    pub(crate) fn brightest(&self) -> f32 {
+        self.brightest
+    }
+
+    /// The first hit within `within` metres of a ray with a unit direction, passing by `ignore`.
+    pub(crate) fn cast(&self, ray: &Ray, within: f32, ignore: Option<ObjectId>) -> Option<Hit> {
+        let (index, distance) = self.tree.cast_ray(ray, within, |index, best| {
+            let primitive = &self.primitives[index as usize];
+            if Some(primitive.object) == ignore {
+                return None;
+            }
+            primitive.shape.distance(ray, best)
+        })?;
+        let primitive = &self.primitives[index as usize];
+        Some(Hit {
+            distance,
+            normal: primitive.shape.normal(ray, f32::MAX),
+            object: primitive.object,
+        })
+    }
+
+    pub(crate) fn object(&self, id: ObjectId) -> &Object {
+        &self.objects[id as usize]
+    }
+
+    /// The floor that one walks on.
+    pub fn floor(&self) -> &Floor {
+        &self.floor
+    }
+
+    /// The material of an object, if there is one of that number.
+    pub fn material(&self, id: ObjectId) -> Option<&Material> {
+        self.objects.get(id as usize).map(|object| &object.material)
+    }
+
+    /// How many objects there are.
+    pub fn object_count(&self) -> usize {
+        self.objects.len()
+    }
+
+    /// How many boxes, cylinders and triangles the objects are made of.
+    pub fn primitive_count(&self) -> usize {
+        self.primitives.len()
+    }
+
+    /// The distance along a ray to the first surface, metres, if there is one within `within_m`.
+    /// `direction` is a unit vector.
+    pub fn distance(&self, from: Vector3, direction: Vector3, within_m: f64) -> Option<f64> {
+        let ray = Ray::new(narrow(from), narrow(direction));
+        self.cast(&ray, within_m as f32, None)
+            .map(|hit| f64::from(hit.distance))
+    }
+}
+
+pub(crate) fn narrow(v: Vector3) -> Vector {
+    Vector::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::floor::RaisedFloor;
+    use crate::scene_builder::SceneBuilder;
+
+    fn distance(scene: &Scene, from: [f64; 3], direction: [f64; 3]) -> Option<f64> {
+        scene.distance(
+            Vector3::from(from),
+            Vector3::from(direction).normalize(),
+            100.0,
+        )
+    }
+
+    #[test]
+    fn a_turned_box_is_hit_on_its_edge_and_its_face() {
+        let mut builder = SceneBuilder::new();
+        // A cube of edge 2 turned by 45 degrees: its edge points at the origin from 10 - sqrt 2.
+        let eighth = std::f64::consts::FRAC_PI_4;
+        builder.cuboid([10.0, 0.0, 0.0], [2.0; 3], eighth, Material::WALL);
+        builder.cuboid(
+            [0.0, 8.0, 0.0],
+            [2.0, 4.0, 2.0],
+            2.0 * eighth,
+            Material::WALL,
+        );
+        let scene = builder.build();
+        let hit = distance(&scene, [0.0; 3], [1.0, 0.0, 0.0]).unwrap();
+        assert!((hit - (10.0 - 2f64.sqrt())).abs() < 1e-5, "{hit}");
+        // The second box lies across: turned a quarter, it is 2 m deep along y.
+        let hit = distance(&scene, [1.9, 0.0, 0.0], [0.0, 1.0, 0.0]).unwrap();
+        assert!((hit - 7.0).abs() < 1e-5, "{hit}");
+    }
+
+    #[test]
+    fn a_cylinder_is_hit_on_its_side_its_cap_and_not_beside_it() {
+        let mut builder = SceneBuilder::new();
+        builder.cylinder([5.0, 0.0, -1.0], 0.25, 2.0, Material::CONCRETE);
+        let scene = builder.build();
+        let side = distance(&scene, [0.0, 0.15, 0.0], [1.0, 0.0, 0.0]).unwrap();
+        assert!((side - 4.8).abs() < 1e-5, "{side}"); // 3-4-5 triangle: 5 - 0.2
+        let cap = distance(&scene, [5.1, 0.0, 3.0], [0.0, 0.0, -1.0]).unwrap();
+        assert!((cap - 2.0).abs() < 1e-5, "{cap}");
+        assert_eq!(distance(&scene, [0.0, 0.26, 0.0], [1.0, 0.0, 0.0]), None);
+        assert_eq!(distance(&scene, [0.0, 0.0, 1.01], [1.0, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn the_ramp_surface_is_where_the_floor_says() {
+        let mut builder = SceneBuilder::new();
+        builder.raised_floor(
+            RaisedFloor {
+                start: [1.0, 0.0],
+                along: [1.0, 0.0],
+                half_width_m: 1.0,
+                ramp_m: 3.0,
+                level_m: 2.0,
+                height_m: 0.35,
+            },
+            Material::FLOOR,
+        );
+        let scene = builder.build();
+        for i in 0..79 {
+            let x = 1.03 + f64::from(i) * 0.1;
+            let down = distance(&scene, [x, 0.37, 2.0], [0.0, 0.0, -1.0]).unwrap();
+            let height = scene.floor().height(x, 0.37);
+            assert!(
+                (2.0 - down - height).abs() < 2e-4,
+                "at {x}: {down}, {height}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_nearest_of_many_objects_is_found() {
+        // Against brute force: pillars on a grid, rays all around.
+        let mut builder = SceneBuilder::new();
+        let mut centres = Vec::new();
+        for i in -5..=5 {
+            for j in -5..=5 {
+                if (i, j) != (0, 0) {
+                    let centre = [3.0 * f64::from(i), 2.7 * f64::from(j)];
+                    centres.push(centre);
+                    builder.cylinder([centre[0], centre[1], -1.0], 0.3, 2.0, Material::WALL);
+                }
+            }
+        }
+        let scene = builder.build();
+        for k in 0..720 {
+            let (sin, cos) = (f64::from(k) * 0.5f64.to_radians()).sin_cos();
+            let expected = centres
+                .iter()
+                .filter_map(|c| {
+                    let (along, across) = (c[0] * cos + c[1] * sin, c[1] * cos - c[0] * sin);
+                    (along > 0.0 && across.abs() < 0.3)
+                        .then(|| along - (0.09 - across * across).sqrt())
+                })
+                .fold(f64::INFINITY, f64::min);
+            let got = distance(&scene, [0.0; 3], [cos, sin, 0.0]).unwrap_or(f64::INFINITY);
+            assert!(
+                got == expected || (got - expected).abs() < 1e-3,
+                "ray {k}: {got} and {expected}"
+            );
+        }
+    }
+}
