@@ -2,7 +2,7 @@
 //! `LidarScans`.
 #![no_main]
 
-#[path = "stream.rs"]
+#[path = "support/stream.rs"]
 mod stream;
 
 use hachi_hal::conformance::ScanPromise;

@@ -1,7 +1,7 @@
 //! Any stream of packets through the VLP-16 driver: turns that keep the promise of `LidarScans`.
 #![no_main]
 
-#[path = "stream.rs"]
+#[path = "support/stream.rs"]
 mod stream;
 
 use hachi_hal::conformance::ScanPromise;

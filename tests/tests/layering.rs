@@ -69,6 +69,37 @@ const LAYERS: &[Layer] = &[
         because: "a stage sees hal and the stages before it",
     },
     Layer {
+        name: "hachi-place",
+        sees: &["hachi-hal"],
+        tests_see: &["hachi-world"],
+        because: "a place is recognised in any cloud: usable by someone who has never heard of this robot",
+    },
+    Layer {
+        name: "hachi-posegraph",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "a pose graph has no sensor: usable by someone who has never heard of this robot",
+    },
+    Layer {
+        name: "hachi-slam",
+        sees: &[
+            "hachi-hal",
+            "hachi-cloud",
+            "hachi-registration",
+            "hachi-odometry",
+            "hachi-place",
+            "hachi-posegraph",
+        ],
+        tests_see: &["hachi-world"],
+        because: "a stage sees hal and the stages before it; files and threads are the program's",
+    },
+    Layer {
+        name: "hachi-store",
+        sees: &["hachi-hal", "hachi-slam"],
+        tests_see: &[],
+        because: "the store keeps what stages hand it, and computes nothing",
+    },
+    Layer {
         name: "hachi-trajectory",
         sees: &["hachi-hal"],
         tests_see: &[],

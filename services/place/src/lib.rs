@@ -1,0 +1,2 @@
+//! Place recognition: Scan Context++ and Gaussian Scan Context.
+#![forbid(unsafe_code)]
