@@ -130,7 +130,8 @@ pub struct LegPosture {
 /// The geometry of a quadruped's legs: joints to feet and back, in the base frame.
 ///
 /// - `jacobian` is the derivative of `foot_in_base` by the joint angles;
-/// - `joints_for(leg, foot_in_base(leg, q))` is `q` for every `q` the joints can take;
+/// - `joints_for(leg, foot_in_base(leg, q))` is `q` for every `q` within the joints' limits that keeps
+///   the foot below its hip, the base upright;
 /// - nothing panics, whatever the numbers; not-a-number in gives not-a-number out, or unreachable.
 pub trait LegKinematics {
     /// The centre of the foot's sphere, metres.
