@@ -14,6 +14,7 @@
 //! | [`sensor`] | which sensors there are, and when their lasers fire |
 //! | [`simulation`], [`lidar`] | packet after packet; as a [`hachi_hal::PacketSource`] |
 //! | [`imu`], [`odometry`] | the other sensors |
+//! | [`legs`] | joints, feet and body of a quadruped that walks the path |
 //! | [`preset`] | ready-made buildings |
 //! | [`capture`] | pcap and TUM files |
 //!
@@ -33,6 +34,7 @@ pub mod capture;
 pub mod floor;
 mod helios;
 pub mod imu;
+pub mod legs;
 pub mod lidar;
 pub mod material;
 pub mod motion;
@@ -53,6 +55,7 @@ mod vlp16;
 pub use capture::{CaptureError, CaptureWriter, write_pcap, write_tum};
 pub use floor::{Floor, RaisedFloor};
 pub use imu::{GRAVITY, ImuConfig, SimulatedImu};
+pub use legs::{LegDimensions, LegTick, LegsConfig, WalkingLegs};
 pub use lidar::{SimulatedLidar, SimulatedLidarError};
 pub use material::{Finish, Material};
 pub use motion::{Axis, BodyMotion, Harmonic};
