@@ -3,7 +3,9 @@
 //! In: nothing; plain data and the trait that bases implement. Elsewhere: who may ask (the safety
 //! gate), and what a particular robot makes of it (the platform crates).
 
-use crate::{DeviceError, Stamp};
+use core::fmt;
+
+use crate::{DeviceError, FaultKind, Stamp};
 
 /// A velocity of the base in its own frame: x forward, y left, turning left is positive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -105,9 +107,22 @@ impl BaseCommand {
         now < self.dies_at()
     }
 
-    /// Whether it is stamped by a clock that is ahead of `now`.
-    pub fn is_from_the_future(&self, now: Stamp) -> bool {
-        self.stamp > now + Self::FUTURE_SLACK_NS
+    /// Refuses what no base may take at `now`.
+    ///
+    /// # Errors
+    /// A number in it is not finite, its clock is ahead, or it is dead.
+    pub fn check(&self, now: Stamp) -> Result<(), CommandFault> {
+        if !self.is_finite() {
+            Err(CommandFault::NotFinite)
+        } else if self.stamp > now + Self::FUTURE_SLACK_NS {
+            let ahead_ns = self.stamp.nanos_since(now);
+            Err(CommandFault::FromTheFuture { ahead_ns })
+        } else if !self.is_alive(now) {
+            let late_ns = now.nanos_since(self.dies_at());
+            Err(CommandFault::Dead { late_ns })
+        } else {
+            Ok(())
+        }
     }
 
     /// Whether it makes the base move in any way, rather than stand still.
@@ -126,6 +141,44 @@ impl BaseCommand {
             BaseAction::Pose(posture) => posture.is_finite(),
             BaseAction::Stop | BaseAction::StandUp | BaseAction::LieDown => true,
         }
+    }
+}
+
+/// Why no base may take a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CommandFault {
+    /// A number in it is not finite.
+    NotFinite,
+    /// It was dead on arrival.
+    Dead {
+        /// How long before it died.
+        late_ns: i64,
+    },
+    /// It is stamped by a clock that is ahead, or jumped.
+    FromTheFuture {
+        /// By how much.
+        ahead_ns: i64,
+    },
+}
+
+impl fmt::Display for CommandFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite => f.write_str("a number of the command is not finite"),
+            Self::Dead { late_ns } => write!(f, "the command died {late_ns} ns before it came"),
+            Self::FromTheFuture { ahead_ns } => {
+                write!(f, "the command is stamped {ahead_ns} ns in the future")
+            }
+        }
+    }
+}
+
+impl core::error::Error for CommandFault {}
+
+impl DeviceError for CommandFault {
+    fn kind(&self) -> FaultKind {
+        FaultKind::ReadAgain
     }
 }
 
@@ -187,7 +240,9 @@ mod tests {
     #[test]
     fn a_clock_that_is_ahead_is_noticed() {
         let now = Stamp::from_nanos(1_000_000_000 - BaseCommand::FUTURE_SLACK_NS);
-        assert!(!command(1).is_from_the_future(now));
-        assert!(command(1).is_from_the_future(now + -1));
+        assert_eq!(command(1).check(now), Ok(()));
+        let ahead_ns = BaseCommand::FUTURE_SLACK_NS + 1;
+        let fault = CommandFault::FromTheFuture { ahead_ns };
+        assert_eq!(command(1).check(now + -1), Err(fault));
     }
 }

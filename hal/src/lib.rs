@@ -41,7 +41,9 @@ pub mod conformance;
 #[cfg(feature = "mock")]
 pub mod mock;
 
-pub use base::{BaseAction, BaseCommand, BaseDrive, BaseStatus, BodyPosture, BodyVelocity};
+pub use base::{
+    BaseAction, BaseCommand, BaseDrive, BaseStatus, BodyPosture, BodyVelocity, CommandFault,
+};
 pub use device::{Clock, DeviceError, FaultKind, Imu, LidarScans, PacketSource, Received};
 pub use geometry::{Pose, Rotation, Vector3};
 pub use imu::ImuSample;

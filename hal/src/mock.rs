@@ -28,7 +28,7 @@ use crate::{
     ScanHeader, Stamp,
 };
 
-pub use robot::{MockBase, MockBaseError, MockBattery, MockEmergencyStop, MockLegs, MockWatchdog};
+pub use robot::{MockBase, MockBattery, MockEmergencyStop, MockLegs, MockWatchdog};
 
 /// What a scripted device does on one call.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -70,6 +70,12 @@ const LAYERS: &[Layer] = &[
         because: "a robot is numbers for what its maker's robots share",
     },
     Layer {
+        name: "hachi-kairos",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "a robot of another maker shares nothing with the others but hal",
+    },
+    Layer {
         name: "hachi-cloud",
         sees: &["hachi-hal"],
         tests_see: &[],

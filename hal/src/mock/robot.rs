@@ -3,12 +3,10 @@
 //! Sources play a script as the sensors do. [`MockBase`] keeps the promise of [`BaseDrive`] and
 //! remembers what it gave the motors; [`MockWatchdog`] remembers when it was fed.
 
-use core::fmt;
-
 use super::{MockError, Player, Step};
 use crate::{
     BaseAction, BaseCommand, BaseDrive, BaseStatus, Battery, BatterySample, BodyVelocity,
-    DeviceError, EmergencyStop, FaultKind, LegState, LegStates, Stamp, StopSample, Watchdog,
+    CommandFault, EmergencyStop, LegState, LegStates, Stamp, StopSample, Watchdog,
 };
 
 /// Defines a source that plays a script through one method of one trait.
@@ -54,36 +52,6 @@ scripted!(
     MockEmergencyStop, StopSample, EmergencyStop, read_stop
 );
 
-/// Why a [`MockBase`] took no command.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum MockBaseError {
-    /// A number in it is not finite.
-    NotFinite,
-    /// It was dead on arrival.
-    Dead,
-    /// It is stamped by a clock that is ahead.
-    FromTheFuture,
-}
-
-impl fmt::Display for MockBaseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotFinite => "a number of the command is not finite",
-            Self::Dead => "the command was dead on arrival",
-            Self::FromTheFuture => "the command is stamped in the future",
-        })
-    }
-}
-
-impl core::error::Error for MockBaseError {}
-
-impl DeviceError for MockBaseError {
-    fn kind(&self) -> FaultKind {
-        FaultKind::ReadAgain
-    }
-}
-
 /// A base without motors: up to 1 m/s and 1 rad/s, with the last `N` moves that it was given.
 #[derive(Debug, Clone, Default)]
 pub struct MockBase<const N: usize> {
@@ -112,23 +80,15 @@ impl<const N: usize> MockBase<N> {
 }
 
 impl<const N: usize> BaseDrive for MockBase<N> {
-    type Error = MockBaseError;
+    type Error = CommandFault;
 
-    fn command(&mut self, command: &BaseCommand, now: Stamp) -> Result<(), MockBaseError> {
-        if !command.is_finite() {
-            return Err(MockBaseError::NotFinite);
-        }
-        if command.is_from_the_future(now) {
-            return Err(MockBaseError::FromTheFuture);
-        }
-        if !command.is_alive(now) {
-            return Err(MockBaseError::Dead);
-        }
+    fn command(&mut self, command: &BaseCommand, now: Stamp) -> Result<(), CommandFault> {
+        command.check(now)?;
         self.command = Some(*command);
         Ok(())
     }
 
-    fn service(&mut self, now: Stamp) -> Result<BaseStatus, MockBaseError> {
+    fn service(&mut self, now: Stamp) -> Result<BaseStatus, CommandFault> {
         let alive = self.command.filter(|c| c.is_alive(now));
         let asked = match alive.map(|c| c.action) {
             Some(BaseAction::Move(velocity)) => velocity,

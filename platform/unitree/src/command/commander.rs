@@ -1,7 +1,8 @@
 //! Which HighCmd is in force: the last command while it lives, standing still otherwise.
 
 use hachi_hal::{
-    BaseAction, BaseCommand, BaseStatus, BodyPosture, BodyVelocity, DeviceError, FaultKind, Stamp,
+    BaseAction, BaseCommand, BaseStatus, BodyPosture, BodyVelocity, CommandFault, DeviceError,
+    FaultKind, Stamp,
 };
 
 use super::ladder::{Mode, ModeLadder, Rung};
@@ -38,21 +39,9 @@ impl Default for CommanderConfig {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CommandRefused {
-    /// A number in it is not finite.
-    #[error("a number of the command {0:?} is not finite")]
-    NotFinite(BaseAction),
-    /// It was dead on arrival.
-    #[error("the command died {late_ns} ns ago")]
-    Dead {
-        /// How long before it arrived.
-        late_ns: i64,
-    },
-    /// Its clock is ahead of the robot's.
-    #[error("the command is stamped {ahead_ns} ns in the future")]
-    FromTheFuture {
-        /// By how much.
-        ahead_ns: i64,
-    },
+    /// No base may take it.
+    #[error(transparent)]
+    Faulty(#[from] CommandFault),
     /// A robot that does not stand can't walk or hold a posture.
     #[error("the robot is not standing but {0:?}: send StandUp first")]
     NotStanding(Rung),
@@ -163,17 +152,7 @@ impl Commander {
     /// # Errors
     /// It is not in order, or the robot can't do it from where it is; nothing changes.
     pub fn command(&mut self, command: &BaseCommand, now: Stamp) -> Result<(), CommandRefused> {
-        if !command.is_finite() {
-            return Err(CommandRefused::NotFinite(command.action));
-        }
-        if command.is_from_the_future(now) {
-            let ahead_ns = command.stamp.nanos_since(now);
-            return Err(CommandRefused::FromTheFuture { ahead_ns });
-        }
-        if !command.is_alive(now) {
-            let late_ns = now.nanos_since(command.dies_at());
-            return Err(CommandRefused::Dead { late_ns });
-        }
+        command.check(now)?;
         let moves = matches!(&command.action, BaseAction::Move(v) if !v.is_zero());
         let needs_feet = moves || matches!(command.action, BaseAction::Pose(_));
         match self.ladder.rung() {
