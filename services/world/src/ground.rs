@@ -172,10 +172,10 @@ impl Ground {
                 let top = self.tops[(walk.at[1] * blocks[0] + walk.at[0]) as usize];
                 let lowest =
                     ray.origin.z + ray.dir.z * if ray.dir.z < 0.0 { leaves } else { enters };
-                if lowest <= top {
-                    if let Some(hit) = self.within_block(ray, enters, leaves, walk.at) {
-                        return Some(hit);
-                    }
+                if lowest <= top
+                    && let Some(hit) = self.within_block(ray, enters, leaves, walk.at)
+                {
+                    return Some(hit);
                 }
             }
             enters = leaves;
@@ -190,8 +190,8 @@ impl Ground {
         let mut walk = Walk::new(from, dir, begin, CELL_M, self.low);
         // Rounding may put the first cell beside the block: it belongs to the block's edge.
         let first = block.map(|b| b * BLOCK as isize);
-        for axis in 0..2 {
-            let clamped = walk.at[axis].clamp(first[axis], first[axis] + BLOCK as isize - 1);
+        for (axis, least) in first.into_iter().enumerate() {
+            let clamped = walk.at[axis].clamp(least, least + BLOCK as isize - 1);
             if clamped != walk.at[axis] && walk.step[axis] == clamped - walk.at[axis] {
                 walk.next[axis] += walk.delta[axis];
             }
@@ -302,7 +302,7 @@ mod tests {
         let ground = Ground::new(&terrain, [-100.0; 2], [100.0; 2], &[cover]);
         let mut met = 0;
         for k in 0..4000 {
-            let azimuth = f64::from(k) * 0.7853;
+            let azimuth = f64::from(k) * 0.777;
             let down = f64::from(k % 41) * 0.01 - 0.05;
             let (x, y) = (
                 f64::from(k % 13) * 11.0 - 66.0,

@@ -105,11 +105,11 @@ pub(crate) fn storey(seed: u64, gait: Gait) -> World {
     let whole = grid.ring([0, 0], [3, 2]);
     let mut builder = SceneBuilder::new();
     whole.floor_and_ceiling(&mut builder, Material::FLOOR, ROOM_DEPTH_M + 8.0);
-    for column in 0..3 {
+    for (column, alike_to) in PATTERN.into_iter().enumerate() {
         for row in 0..2 {
             let block = grid.ring([column, row], [column + 1, row + 1]);
             block.lamps(&mut builder);
-            let mut random = pattern(2 * PATTERN[column] + row as u64);
+            let mut random = pattern(2 * alike_to + row as u64);
             if [column, row] == HALL {
                 hall(&mut builder, &block, &mut random);
             } else {
@@ -201,7 +201,7 @@ fn outer_rooms(
     ] {
         side.wall(builder, end, 0.0, grid.ceiling, &[]);
     }
-    for column in 0..3 {
+    for (column, alike_to) in PATTERN.into_iter().enumerate() {
         let [low, high] =
             [column, column + 1].map(|line| grid.columns[line] - grid.columns[0] + HALF_WIDTH_M);
         // The upper side runs against the columns.
@@ -210,7 +210,7 @@ fn outer_rooms(
         } else {
             row(length - high, length - low)
         };
-        let mut random = pattern(16 + 4 * PATTERN[column] + i as u64);
+        let mut random = pattern(16 + 4 * alike_to + i as u64);
         if i == 0 && column == CELLS {
             alike(builder, &row, grid.ceiling, &random);
         } else {
