@@ -10,6 +10,7 @@ pub(crate) enum Purpose {
     Packets = 2,
     Imu = 3,
     Odometry = 4,
+    Strays = 5,
 }
 
 /// A generator of its own for `purpose` and the `index`-th thing of that purpose.
