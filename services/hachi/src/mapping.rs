@@ -3,6 +3,7 @@
 //! In: scans with what else was measured. Out: a pose for each scan, a map, a report. Read
 //! [`Mapping::step`] first; [`run`] feeds it from any recording, or from the simulated robot.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use hachi_cloud::{Filtered, Filters, IntensityUse, RemovalCounts, ScanFrames};
@@ -56,11 +57,12 @@ pub struct Mapping {
 }
 
 impl Mapping {
-    /// A pipeline with these settings.
+    /// A pipeline with these settings. What the map holds beyond a few megabytes is kept on the disk
+    /// of the folder `scratch`.
     ///
     /// # Errors
     /// A setting that no filter can work with.
-    pub fn new(config: MappingConfig) -> Result<Self, Failure> {
+    pub fn new(config: MappingConfig, scratch: &Path) -> Result<Self, Failure> {
         let filters = Filters::new(config.filter.clone())
             .map_err(|error| Failure::new(error, "correct the [filter] section"))?;
         Ok(Self {
@@ -71,7 +73,7 @@ impl Mapping {
             filters,
             odometry: Odometry::new(config.odometry.clone()),
             kept: Vec::new(),
-            map: MapBuilder::new(config.map.voxel_m),
+            map: MapBuilder::new(config.map.voxel_m, scratch),
             trajectory: Trajectory::new(),
             mapped_at: None,
             times: StageRecorder::new(&STAGES),

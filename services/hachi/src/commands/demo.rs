@@ -60,7 +60,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     };
     let lidar = SimulatedLidar::new(Simulation::new(world.clone()));
     let mut source = from_packets(driver, lidar, |_| Vec::new());
-    let mut mapping = Mapping::new(config)?;
+    let mut mapping = Mapping::new(config, results.folder())?;
 
     let pool = thread_pool(None)?;
     let (ended, mut report) = pool.install(|| {

@@ -30,7 +30,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let results = Results::create_for(&arguments.input, &arguments.out)?;
     let cancelled = Cancelled::on_interrupt()?;
     let bar = progress::bar(source.scan_count(), "scans");
-    let mut mapping = Mapping::new(config)?;
+    let mut mapping = Mapping::new(config, results.folder())?;
 
     let pool = thread_pool(arguments.threads.map(|n| n.get()))?;
     let (ended, mut report) = pool.install(|| {
