@@ -70,7 +70,7 @@ const LAYERS: &[Layer] = &[
     },
     Layer {
         name: "hachi-place",
-        sees: &["hachi-hal"],
+        sees: &["hachi-hal", "hachi-cloud"],
         tests_see: &["hachi-world"],
         because: "a place is recognised in any cloud: usable by someone who has never heard of this robot",
     },
