@@ -6,6 +6,7 @@ use hachi_registration::Degeneracy;
 use nalgebra::Matrix6;
 
 use crate::condition::SlamCondition;
+use crate::graph::GraphError;
 use crate::ledger::LedgerEntry;
 use crate::node::{NodeId, PieceId};
 use crate::store::StoreError;
@@ -61,6 +62,8 @@ pub struct SlamEvents {
     pub joined: Vec<(PieceId, PieceId)>,
     /// What the store could not do.
     pub store_errors: Vec<StoreError>,
+    /// What the graph would not take.
+    pub graph_errors: Vec<GraphError>,
 }
 
 impl SlamEvents {
@@ -71,5 +74,6 @@ impl SlamEvents {
         self.moved = false;
         self.joined.clear();
         self.store_errors.clear();
+        self.graph_errors.clear();
     }
 }

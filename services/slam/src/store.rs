@@ -12,8 +12,8 @@ use crate::node::{Node, NodeId, PieceId};
 /// What joined or changed the map at one moment: kept whole or not at all.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MapChange<'a> {
-    /// New nodes with their submaps ([`codec`](crate::codec)).
-    pub nodes: &'a [(Node, &'a [u8])],
+    /// New nodes.
+    pub nodes: &'a [NewNode<'a>],
     /// New edges.
     pub edges: &'a [Edge],
     /// Edges that are no longer part of the map, by number.
@@ -24,6 +24,17 @@ pub struct MapChange<'a> {
     pub poses: &'a [(NodeId, Pose)],
     /// Pieces that were joined to another: all nodes of the first now hang on the second.
     pub joined: &'a [(PieceId, PieceId)],
+}
+
+/// A node that joins the map.
+#[derive(Debug, Clone, Copy)]
+pub struct NewNode<'a> {
+    /// What is known of it.
+    pub node: Node,
+    /// Its submap, as [`codec`](crate::codec) writes it.
+    pub submap: &'a [u8],
+    /// Its looks, as [`hachi_place::Descriptor::to_bytes`] writes them.
+    pub descriptor: &'a [u8],
 }
 
 impl MapChange<'_> {
@@ -90,12 +101,12 @@ pub struct MemoryStore {
 
 impl SubmapStore for MemoryStore {
     fn commit(&mut self, change: &MapChange<'_>) -> Result<(), StoreError> {
-        for (node, submap) in change.nodes {
-            let index = node.id.index();
+        for new in change.nodes {
+            let index = new.node.id.index();
             if self.submaps.len() <= index {
                 self.submaps.resize(index + 1, None);
             }
-            self.submaps[index] = Some((*submap).into());
+            self.submaps[index] = Some(new.submap.into());
         }
         Ok(())
     }
