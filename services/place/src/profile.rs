@@ -171,6 +171,22 @@ impl Profile {
         })
     }
 
+    /// The profile of a database's first clouds: the one that most of them ask for,
+    /// [`OUTDOOR`](Self::OUTDOOR) if there is none.
+    pub fn for_clouds<'a>(clouds: impl IntoIterator<Item = &'a [[f32; 4]]>) -> Self {
+        let (mut indoor, mut outdoor) = (0, 0);
+        for profile in clouds.into_iter().filter_map(Self::for_cloud) {
+            match profile == Self::INDOOR {
+                true => indoor += 1,
+                false => outdoor += 1,
+            }
+        }
+        match indoor > outdoor {
+            true => Self::INDOOR,
+            false => Self::OUTDOOR,
+        }
+    }
+
     /// Rings, from the middle outwards.
     pub const fn rings(&self) -> usize {
         self.rings as usize

@@ -228,6 +228,27 @@ impl Simulation {
             .map(|stamp| stamp + i64::from(self.status_due) * STATUS_DELAY_NS)
     }
 
+    /// Goes on, or back, to the first data packet that is received at `stamp` or later; what is sent
+    /// from there on is what it would have been without the leap.
+    pub fn seek(&mut self, stamp: Stamp) {
+        let after_ns = stamp.nanos_since(self.config.start);
+        let first = received_ns(self.config.sensor, 0);
+        let packet_ns = self.config.sensor.packet_ns();
+        let index = match after_ns <= first {
+            true => 0,
+            false => ((after_ns - first) as u64).div_ceil(packet_ns as u64),
+        };
+        let index = index.min(self.total);
+        self.status_due = false;
+        // Batches begin at multiples of their size.
+        self.made = index - index % BATCH as u64;
+        self.given = self.made;
+        if index > self.given {
+            self.make_batch();
+            self.given = index;
+        }
+    }
+
     /// The next packet; `None` at the end. Status packets follow the data packet they come with.
     pub fn next_packet(&mut self) -> Option<SimulatedPacket<'_>> {
         let stamp = self.next_stamp()?;
