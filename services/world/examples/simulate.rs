@@ -14,7 +14,7 @@ use hachi_world::{Preset, SensorKind, Simulation, SimulationConfig, write_pcap, 
 
 #[derive(Parser)]
 struct Arguments {
-    /// office, glass-corridor, corridor or stress.
+    /// office, glass-corridor, corridor, stress, building, campus or campus-long.
     #[arg(long, default_value = "office", value_parser = preset)]
     preset: Preset,
     /// vlp16, vlp16-dual or helios16p.

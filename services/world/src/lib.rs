@@ -29,8 +29,10 @@
 
 mod building;
 mod calendar;
+mod campus;
 pub mod capture;
 pub mod floor;
+mod ground;
 mod helios;
 pub mod imu;
 pub mod lidar;
@@ -51,7 +53,7 @@ pub mod trajectory;
 mod vlp16;
 
 pub use capture::{CaptureError, CaptureWriter, write_pcap, write_tum};
-pub use floor::{Floor, RaisedFloor};
+pub use floor::{Floor, RaisedFloor, Terrain, Wave};
 pub use imu::{GRAVITY, ImuConfig, SimulatedImu};
 pub use lidar::{SimulatedLidar, SimulatedLidarError};
 pub use material::{Finish, Material};
