@@ -8,8 +8,8 @@ use crate::uncertainty::OdometryNoise;
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct SlamConfig {
     /// A node is fixed when the robot has travelled this far since the last, the thesis's
-    /// `delta_m`.
-    pub node_every_m: f64,
+    /// `delta_m`. Unset, it follows from how far one sees: 1.5 m in rooms, 5 m in streets.
+    pub node_every_m: Option<f64>,
     /// Or has turned this far, `delta_theta`.
     pub node_every_rad: f64,
     /// But not before this many scans: what a node costs is spread over them.
@@ -53,7 +53,7 @@ pub struct SlamConfig {
 impl Default for SlamConfig {
     fn default() -> Self {
         Self {
-            node_every_m: 2.0,
+            node_every_m: None,
             node_every_rad: 1.2,
             node_least_scans: 10,
             scan_every_m: 0.2,

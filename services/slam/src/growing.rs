@@ -148,7 +148,10 @@ impl Growing {
             return false;
         }
         let turned = begun.odom_from_first.rotation.angle_to(&last.rotation);
-        self.path_m - begun.path_m >= config.node_every_m || turned >= config.node_every_rad
+        // Cubes grow with the distances seen; ten of them are a step that shows something new.
+        let by_scene = (10.0 * f64::from(self.builder.voxel_m())).clamp(1.5, 5.0);
+        let every_m = config.node_every_m.unwrap_or(by_scene);
+        self.path_m - begun.path_m >= every_m || turned >= config.node_every_rad
     }
 
     /// Takes the submap; the next begins at the present scan and hangs on it. `None` if it is empty.

@@ -42,8 +42,8 @@ pub struct SlamEstimate {
     pub covariance: Matrix6<f64>,
     /// How far to trust it.
     pub condition: SlamCondition,
-    /// The piece of map that `map_from_base` is on.
-    pub piece: PieceId,
+    /// The piece of map that `map_from_base` is on; `None` before the first node.
+    pub piece: Option<PieceId>,
     /// The last fixed node, and where the base was seen from it by odometry: what is needed to place
     /// this scan again when the node has moved. `None` before the first node.
     pub anchor: Option<(NodeId, Pose)>,

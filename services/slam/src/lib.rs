@@ -18,10 +18,12 @@ pub mod map;
 pub mod node;
 pub mod places;
 pub mod recognition;
+pub mod saved;
 pub mod slam;
 pub mod store;
 pub mod submap;
 pub mod surfaces;
+pub mod track;
 pub mod uncertainty;
 pub mod work;
 

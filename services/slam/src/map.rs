@@ -15,6 +15,7 @@ use crate::graph::{GraphError, PoseGraph};
 use crate::ledger::{FoundBy, LedgerEntry, LoopId, Verdict};
 use crate::node::{Node, NodeId, PieceId};
 use crate::places::Places;
+use crate::saved::{SavedMap, SavedMapError};
 use crate::store::{MapChange, NewNode, StoreError, SubmapStore};
 use crate::submap::Submap;
 use crate::uncertainty::invert;
@@ -36,6 +37,18 @@ pub struct Piece {
     /// The piece it was joined to, if it was.
     pub joined_to: Option<PieceId>,
     graph: Option<PoseGraph>,
+}
+
+/// Why a saved map can't be gone on with.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ResumeError {
+    /// Its parts do not fit together.
+    #[error(transparent)]
+    Saved(#[from] SavedMapError),
+    /// Its edges do not hold its nodes together.
+    #[error(transparent)]
+    Graph(#[from] GraphError),
 }
 
 /// The map.
@@ -92,6 +105,64 @@ impl Map {
             most_chi2,
             pending: Pending::default(),
         }
+    }
+
+    /// A saved map, whose submaps `store` has. Descriptors that can't be read cost a place's looks,
+    /// not the map.
+    ///
+    /// # Errors
+    /// Its parts do not fit together.
+    pub fn resume(
+        saved: SavedMap,
+        store: Box<dyn SubmapStore>,
+        submap_memory_bytes: usize,
+        most_chi2: f64,
+    ) -> Result<Self, ResumeError> {
+        saved.check()?;
+        let mut map = Self::new(store, submap_memory_bytes, most_chi2);
+        for (node, bytes) in &saved.descriptors {
+            map.places.insert_bytes(*node, bytes);
+        }
+        for piece in (0..saved.pieces()).map(PieceId) {
+            map.begin_piece();
+            let of_piece = |id: NodeId| saved.nodes[id.index()].piece == piece;
+            let mut placed = saved
+                .nodes
+                .iter()
+                .filter(|n| n.piece == piece)
+                .map(|n| (n.id, n.map_from_node));
+            let slot = &mut map.pieces[piece.0 as usize];
+            let Some((first, pose)) = placed.next() else {
+                // Only a joined piece has no nodes of its own; which it was joined to is of no
+                // matter any more.
+                slot.joined_to = Some(PieceId(0));
+                continue;
+            };
+            let rest: Vec<(NodeId, Pose)> = placed.collect();
+            let edges: Vec<Edge> = saved
+                .edges
+                .iter()
+                .filter(|e| of_piece(e.first) && of_piece(e.second))
+                .copied()
+                .collect();
+            let mut graph = PoseGraph::new(first, &pose)?;
+            graph.update(&rest, &edges, &[])?;
+            graph.settle()?;
+            slot.graph = Some(graph);
+        }
+        map.next_edge = saved.edges.iter().map(|e| e.id + 1).max().unwrap_or(0);
+        map.pending.stored = saved.nodes.iter().map(|n| n.map_from_node).collect();
+        (map.nodes, map.edges, map.ledger) = (saved.nodes, saved.edges, saved.ledger);
+        for piece in 0..map.pieces.len() as u32 {
+            map.take_poses(PieceId(piece));
+        }
+        Ok(map)
+    }
+
+    /// How many runs of the robot made it.
+    pub fn sessions(&self) -> u32 {
+        let highest = self.nodes.iter().map(|n| n.session).max();
+        highest.map_or(0, |s| s.saturating_add(1))
     }
 
     /// All nodes, by number.

@@ -38,6 +38,8 @@ pub struct Node {
     pub session: u32,
     /// The piece it hangs on.
     pub piece: PieceId,
+    /// Whether odometry knows the way to it from the node before.
+    pub chained: bool,
     /// The end of the submap's first scan.
     pub stamp: Stamp,
     /// Where odometry put it.

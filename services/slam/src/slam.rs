@@ -10,10 +10,13 @@ use nalgebra::Matrix6;
 use crate::condition::{SlamCondition, SlamDoubt};
 use crate::config::SlamConfig;
 use crate::growing::{Growing, GrownSubmap};
+use crate::graph::GraphError;
 use crate::input::{ScanInput, SlamEstimate, SlamEvents};
-use crate::map::Map;
-use crate::node::{NodeId, PieceId};
-use crate::store::SubmapStore;
+use crate::ledger::{LedgerEntry, LoopId};
+use crate::map::{Map, ResumeError};
+use crate::node::NodeId;
+use crate::saved::SavedMap;
+use crate::store::{MemoryStore, SubmapStore};
 use crate::uncertainty::invert;
 use crate::work::{Work, Workshop};
 
@@ -60,6 +63,25 @@ impl Slam {
             broken: false,
             config,
         }
+    }
+
+    /// Goes on with a saved map, in another frame of odometry: until places of it are recognised, the
+    /// robot is `LOST`, and what it sees is a piece of its own.
+    ///
+    /// # Errors
+    /// The parts of the map do not fit together.
+    pub fn resume(
+        config: SlamConfig,
+        saved: SavedMap,
+        store: Box<dyn SubmapStore>,
+    ) -> Result<Self, ResumeError> {
+        let memory = config.submap_memory_mb.saturating_mul(1 << 20);
+        let map = Map::resume(saved, store, memory, config.loop_most_chi2)?;
+        let session = map.sessions();
+        let mut slam = Self::new(config, Box::new(MemoryStore::default()));
+        slam.map = map;
+        slam.workshop.begin_session(session);
+        Ok(slam)
     }
 
     /// Whether [`Slam::step`] will look at the points of a scan that odometry placed here.
@@ -116,6 +138,38 @@ impl Slam {
         &mut self.map
     }
 
+    /// The number of this run of the robot.
+    pub fn session(&self) -> u32 {
+        self.workshop.session()
+    }
+
+    /// Takes a loop out by hand, and optimises again without it. The entry as it is then; `None` if
+    /// there is no such loop in the map.
+    ///
+    /// # Errors
+    /// The graph can't do without it: it alone joins two parts of the map.
+    pub fn veto(&mut self, loop_id: LoopId) -> Result<Option<LedgerEntry>, GraphError> {
+        let entry = self.map.veto(loop_id)?;
+        self.take_over();
+        Ok(entry)
+    }
+
+    /// Proposes that a node is near an old one, at `candidate_from_node`: it is checked like any other
+    /// candidate with the work of the next scans. `false` if there are no such nodes.
+    pub fn propose(
+        &mut self,
+        node: NodeId,
+        candidate: NodeId,
+        candidate_from_node: &Pose,
+    ) -> bool {
+        let there = |id| self.map.node(id).is_some();
+        let known = there(node) && there(candidate) && node != candidate;
+        if known {
+            self.workshop.propose(node, candidate, candidate_from_node);
+        }
+        known
+    }
+
     /// The settings.
     pub fn config(&self) -> &SlamConfig {
         &self.config
@@ -162,12 +216,14 @@ impl Slam {
     /// Some steps of the work that waits.
     fn work(&mut self, steps: usize, events: &mut SlamEvents) {
         for _ in 0..steps {
-            if !self.workshop.is_busy() {
-                let Some(grown) = self.waiting.pop_front() else {
-                    return;
-                };
+            if self.workshop.is_free()
+                && let Some(grown) = self.waiting.pop_front()
+            {
                 self.workshop
                     .begin(grown, &mut self.map, &self.map_from_odom, &self.config);
+            }
+            if !self.workshop.is_busy() {
+                return;
             }
             let hurry = !self.waiting.is_empty();
             match self.workshop.step(&mut self.map, hurry, &self.config, events) {
@@ -204,7 +260,7 @@ impl Slam {
             map_from_base: self.map_from_odom * scan.odom_from_base,
             covariance: self.covariance + invert(&self.growing.way().information()),
             condition: self.condition(&scan.condition),
-            piece: anchor.map_or(PieceId(0), |node| node.piece),
+            piece: anchor.map(|node| node.piece),
             anchor: since,
         }
     }

@@ -142,6 +142,11 @@ impl SubmapBuilder {
         self.scans = 0;
     }
 
+    /// Edge of a cube so far, metres.
+    pub fn voxel_m(&self) -> f32 {
+        self.voxel_m
+    }
+
     /// How many scans joined.
     pub fn scans(&self) -> usize {
         self.scans

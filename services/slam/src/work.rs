@@ -16,13 +16,16 @@ use crate::closing::Closing;
 use crate::config::SlamConfig;
 use crate::growing::GrownSubmap;
 use crate::input::SlamEvents;
-use crate::ledger::{LedgerEntry, LoopId, Refusal, Verdict};
+use crate::ledger::{FoundBy, LedgerEntry, LoopId, Refusal, Verdict};
 use crate::map::Map;
 use crate::node::{Node, NodeId, PieceId};
 use crate::recognition::Recognition;
 
 /// The ground below the base, metres, where no submap has shown it yet.
 const USUAL_GROUND_M: f32 = -0.5;
+
+/// Proposals that wait to be checked.
+const MOST_PROPOSED: usize = 64;
 
 /// What a step did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +68,7 @@ pub struct Workshop {
     closing: Closing,
     recognition: Recognition,
     found: Vec<Candidate>,
+    proposed: VecDeque<(NodeId, Candidate)>,
     /// The nodes of the present piece that were fixed since it began, the last first; a few.
     recent: VecDeque<NodeId>,
     piece: Option<PieceId>,
@@ -76,7 +80,40 @@ pub struct Workshop {
 impl Workshop {
     /// Whether there is something to do.
     pub fn is_busy(&self) -> bool {
-        !matches!(self.stage, Stage::Idle)
+        !matches!(self.stage, Stage::Idle) || !self.proposed.is_empty()
+    }
+
+    /// Whether the next submap can be begun with.
+    pub fn is_free(&self) -> bool {
+        matches!(self.stage, Stage::Idle)
+    }
+
+    /// Another run of the robot: what it sees hangs on nothing at first.
+    pub fn begin_session(&mut self, session: u32) {
+        self.session = session;
+        self.recent.clear();
+        self.piece = None;
+        self.recognition.clear();
+    }
+
+    /// The number of this run of the robot.
+    pub fn session(&self) -> u32 {
+        self.session
+    }
+
+    /// A candidate from elsewhere, to be checked when there is time. The oldest goes if there are too
+    /// many.
+    pub fn propose(&mut self, node: NodeId, candidate: NodeId, candidate_from_node: &Pose) {
+        if self.proposed.len() >= MOST_PROPOSED {
+            self.proposed.pop_front();
+        }
+        let candidate = Candidate {
+            node: candidate,
+            found_by: FoundBy::Proposal,
+            looks: None,
+            proposed: Some(*candidate_from_node),
+        };
+        self.proposed.push_back((node, candidate));
     }
 
     /// The last node that was fixed, if odometry still hangs on it.
@@ -134,7 +171,13 @@ impl Workshop {
         events: &mut SlamEvents,
     ) -> Work {
         match std::mem::take(&mut self.stage) {
-            Stage::Idle => Work::Going,
+            Stage::Idle => {
+                if let Some((node, candidate)) = self.proposed.pop_front() {
+                    let rest = VecDeque::from([candidate]);
+                    self.stage = Stage::Proving { node, rest };
+                }
+                Work::Going
+            }
             Stage::Aligning(grown) => {
                 self.stage = match self.chain.step() {
                     Some(edge) => Stage::Fixing(grown, Some(edge)),
@@ -181,6 +224,7 @@ impl Workshop {
             id,
             session: self.session,
             piece,
+            chained: edge.is_some(),
             stamp: grown.stamp,
             odom_from_node: grown.odom_from_node,
             map_from_node,
