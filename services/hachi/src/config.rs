@@ -8,6 +8,7 @@ use std::path::Path;
 use hachi_cloud::FilterConfig;
 use hachi_hal::{Pose, Rotation, Vector3};
 use hachi_odometry::OdometryConfig;
+use hachi_slam::SlamConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
@@ -74,6 +75,8 @@ pub struct MappingConfig {
     pub filter: FilterConfig,
     /// Odometry.
     pub odometry: OdometryConfig,
+    /// SLAM.
+    pub slam: SlamConfig,
     /// The map.
     pub map: MapConfig,
 }

@@ -15,6 +15,7 @@
 //! | [`config`] | settings |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
 //! | [`precision_recall_picture`] | precision over recall |
+//! | [`slam_stage`] | SLAM as a stage of the flow |
 //! | [`results`] | the files of a run |
 
 pub mod cli;
@@ -34,6 +35,7 @@ pub mod progress;
 pub mod recording;
 pub mod report;
 pub mod results;
+pub mod slam_stage;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -29,6 +29,9 @@ pub struct DemoArguments {
     /// on rolling ground, 2.5 km in 21 minutes) or campus-long (20 km at 4 m/s).
     #[arg(long, value_name = "NAME", default_value = "office", value_parser = world)]
     pub world: Preset,
+    /// How far through the pipeline to go.
+    #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
+    pub stage: StageArgument,
     /// What it carries: vlp16, vlp16-dual or helios16p.
     #[arg(long, value_name = "NAME", default_value = "vlp16", value_parser = sensor)]
     pub sensor: SensorKind,
@@ -117,6 +120,8 @@ pub struct ReplayArguments {
 pub enum StageArgument {
     /// Scan by scan, without closing loops.
     Odometry,
+    /// With submaps, loops and a map that is optimised as a whole.
+    Slam,
 }
 
 /// Which filter takes reflections away.
