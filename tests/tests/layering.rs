@@ -51,6 +51,25 @@ const LAYERS: &[Layer] = &[
                   from any source, so only its tests name one",
     },
     Layer {
+        name: "hachi-unitree",
+        sees: &["hachi-hal", "hachi-datagram"],
+        tests_see: &["hachi-b1", "hachi-go1"],
+        because: "what a maker's robots share names none of them: only its tests put their numbers \
+                  in; a robot talks over the same sockets as a sensor, and no service is in sight",
+    },
+    Layer {
+        name: "hachi-b1",
+        sees: &["hachi-hal", "hachi-unitree"],
+        tests_see: &[],
+        because: "a robot is numbers for what its maker's robots share",
+    },
+    Layer {
+        name: "hachi-go1",
+        sees: &["hachi-hal", "hachi-unitree"],
+        tests_see: &[],
+        because: "a robot is numbers for what its maker's robots share",
+    },
+    Layer {
         name: "hachi-cloud",
         sees: &["hachi-hal"],
         tests_see: &[],
