@@ -3,7 +3,14 @@
 //! In: the lower triangle of a symmetric matrix, column by column, with one row more below: the
 //! right-hand side. Out, in the same place: for the first columns the factor `L` and, in the last
 //! row, `L^-1 b`; for the others the Schur complement and its right-hand side. Elsewhere: what the
-//! rows and columns mean (`isam2`).
+//! rows and columns mean (`isam2`), products (`product`).
+//!
+//! faer's routines are made for matrices of hundreds of rows; most of these have six to sixty, where
+//! a call costs more than the work. So these are our own, on pulp's vectors, faer's own basis.
+
+mod product;
+
+use pulp::{Arch, Simd, WithSimd};
 
 /// Why a pivot can't be divided by.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,12 +20,6 @@ pub(crate) struct PivotFailure {
     /// False if it is no number at all.
     pub finite: bool,
 }
-
-/// Columns that are finished before the next ones are touched.
-const PANEL: usize = 12;
-/// Rows and columns of the matrix product that stay in registers.
-const TILE_ROWS: usize = 8;
-const TILE_COLUMNS: usize = 4;
 
 /// Eliminates the first `pivots` of `columns` columns, each of `columns + 1` rows.
 ///
@@ -32,102 +33,127 @@ pub(crate) fn eliminate(
     columns: usize,
     pivots: usize,
     least: &[f64],
-    mut weak: impl FnMut(usize) -> bool,
+    weak: impl FnMut(usize) -> bool,
 ) -> Result<(), PivotFailure> {
-    let rows = columns + 1;
-    let mut begin = 0;
-    while begin < pivots {
-        let end = (begin + PANEL).min(pivots);
-        subtract_products(matrix, rows, begin, end, 0);
-        for k in begin..end {
-            let (before, rest) = matrix.split_at_mut(k * rows);
-            let column = &mut rest[k..rows];
-            for j in begin..k {
-                let other = &before[j * rows + k..(j + 1) * rows];
-                let factor = other[0];
-                for (a, b) in column.iter_mut().zip(other) {
-                    *a -= factor * b;
-                }
+    Arch::new().dispatch(Elimination {
+        matrix,
+        columns,
+        pivots,
+        least,
+        weak,
+    })
+}
+
+/// Columns that are finished before the next ones are touched: as many as a tile is wide.
+const PANEL: usize = product::COLUMNS;
+
+struct Elimination<'a, F> {
+    matrix: &'a mut [f64],
+    columns: usize,
+    pivots: usize,
+    least: &'a [f64],
+    weak: F,
+}
+
+impl<F: FnMut(usize) -> bool> WithSimd for Elimination<'_, F> {
+    type Output = Result<(), PivotFailure>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) -> Self::Output {
+        let rows = self.columns + 1;
+        let mut begin = 0;
+        while begin < self.pivots {
+            let end = (begin + PANEL).min(self.pivots);
+            product::subtract(simd, self.matrix, rows, begin, end);
+            self.factor_diagonal(begin, end)?;
+            let panel = &mut self.matrix[begin * rows..end * rows];
+            match end - begin {
+                4 => finish_panel::<S, 4>(simd, panel, rows, begin),
+                3 => finish_panel::<S, 3>(simd, panel, rows, begin),
+                2 => finish_panel::<S, 2>(simd, panel, rows, begin),
+                _ => finish_panel::<S, 1>(simd, panel, rows, begin),
             }
-            let mut pivot = column[0];
+            begin = end;
+        }
+        if self.pivots > 0 {
+            product::subtract(simd, self.matrix, rows, self.pivots, self.columns);
+        }
+        Ok(())
+    }
+}
+
+impl<F: FnMut(usize) -> bool> Elimination<'_, F> {
+    /// Cholesky of the panel's diagonal block.
+    #[inline(always)]
+    fn factor_diagonal(&mut self, begin: usize, end: usize) -> Result<(), PivotFailure> {
+        let rows = self.columns + 1;
+        for k in begin..end {
+            let mut pivot = self.matrix[k * rows + k];
+            for j in begin..k {
+                pivot -= self.matrix[j * rows + k].powi(2);
+            }
             // Also true for NaN.
-            if !(pivot > least[k]) || pivot == f64::INFINITY {
+            if !(pivot > self.least[k]) || pivot == f64::INFINITY {
                 let finite = pivot.is_finite();
-                if !finite || !weak(k) {
+                if !finite || !(self.weak)(k) {
                     return Err(PivotFailure { column: k, finite });
                 }
-                pivot = least[k];
+                pivot = self.least[k];
             }
             let root = pivot.sqrt();
-            column[0] = root;
-            let inverse = 1.0 / root;
-            column[1..].iter_mut().for_each(|v| *v *= inverse);
-        }
-        begin = end;
-    }
-    subtract_products(matrix, rows, pivots, columns, 0);
-    Ok(())
-}
-
-/// Columns `begin..end`, from the diagonal down: minus the products of columns `from..begin`.
-fn subtract_products(matrix: &mut [f64], rows: usize, begin: usize, end: usize, from: usize) {
-    if from >= begin {
-        return;
-    }
-    let (done, rest) = matrix.split_at_mut(begin * rows);
-    let done = &done[from * rows..];
-    let mut j = begin;
-    while j < end {
-        let width = (end - j).min(TILE_COLUMNS);
-        let target = &mut rest[(j - begin) * rows..(j - begin + width) * rows];
-        if width == TILE_COLUMNS {
-            let mut i = j;
-            while i + TILE_ROWS <= rows {
-                tile(target, done, rows, i, j);
-                i += TILE_ROWS;
+            self.matrix[k * rows + k] = root;
+            for i in k + 1..end {
+                let mut v = self.matrix[k * rows + i];
+                for j in begin..k {
+                    v -= self.matrix[j * rows + i] * self.matrix[j * rows + k];
+                }
+                self.matrix[k * rows + i] = v / root;
             }
-            edge(target, done, rows, i, j, width);
-        } else {
-            edge(target, done, rows, j, j, width);
         }
-        j += width;
+        Ok(())
     }
 }
 
-/// Rows `i..i + TILE_ROWS` of the four columns from `j` on. Entries above the diagonal of the
-/// first tile are written too; nobody reads them.
+/// The rows below the diagonal block of `C` columns: solved with that block from the right.
 #[inline(always)]
-fn tile(target: &mut [f64], done: &[f64], rows: usize, i: usize, j: usize) {
-    let mut sums = [[0.0; TILE_ROWS]; TILE_COLUMNS];
-    for column in done.chunks_exact(rows) {
-        let left: &[f64; TILE_ROWS] = column[i..i + TILE_ROWS].try_into().expect("a whole tile");
-        let right: &[f64; TILE_COLUMNS] = column[j..j + TILE_COLUMNS]
-            .try_into()
-            .expect("a whole tile");
-        for (sums, r) in sums.iter_mut().zip(right) {
-            for (sum, l) in sums.iter_mut().zip(left) {
-                *sum += l * r;
-            }
+fn finish_panel<S: Simd, const C: usize>(simd: S, panel: &mut [f64], rows: usize, begin: usize) {
+    let mut factor = [[0.0; C]; C];
+    let mut inverse = [0.0; C];
+    for c in 0..C {
+        for j in 0..c {
+            factor[c][j] = panel[j * rows + begin + c];
         }
+        inverse[c] = 1.0 / panel[c * rows + begin + c];
     }
-    for (c, sums) in sums.iter().enumerate() {
-        let target = &mut target[c * rows + i..c * rows + i + TILE_ROWS];
-        for (t, s) in target.iter_mut().zip(sums) {
-            *t -= s;
-        }
-    }
-}
-
-/// Rows from `i` on of `width` columns from `j` on.
-fn edge(target: &mut [f64], done: &[f64], rows: usize, i: usize, j: usize, width: usize) {
-    for c in 0..width {
-        let i = i.max(j + c);
-        let target = &mut target[c * rows + i..(c + 1) * rows];
-        for column in done.chunks_exact(rows) {
-            let factor = column[j + c];
-            for (t, l) in target.iter_mut().zip(&column[i..]) {
-                *t -= factor * l;
+    let mut rest = panel;
+    let columns: [&mut [f64]; C] = core::array::from_fn(|_| {
+        let (column, after) = core::mem::take(&mut rest).split_at_mut(rows);
+        rest = after;
+        &mut column[begin + C..]
+    });
+    let length = rows - begin - C;
+    let lanes = S::F64_LANES;
+    let whole = length - length % lanes;
+    let mut i = 0;
+    while i < whole {
+        let mut x = [simd.splat_f64s(0.0); C];
+        for c in 0..C {
+            let mut v = S::as_simd_f64s(&columns[c][i..i + lanes]).0[0];
+            for j in 0..c {
+                v = simd.negate_mul_add_e_f64s(simd.splat_f64s(factor[c][j]), x[j], v);
             }
+            x[c] = simd.mul_f64s(v, simd.splat_f64s(inverse[c]));
+            S::as_mut_simd_f64s(&mut columns[c][i..i + lanes]).0[0] = x[c];
+        }
+        i += lanes;
+    }
+    for i in whole..length {
+        for c in 0..C {
+            let mut v = columns[c][i];
+            for j in 0..c {
+                v -= factor[c][j] * columns[j][i];
+            }
+            columns[c][i] = v * inverse[c];
         }
     }
 }
@@ -149,11 +175,33 @@ pub(crate) fn back_substitute_in_place(
     pivots: usize,
     x: &mut [f64],
 ) {
-    let rows = columns + 1;
-    for k in (0..pivots).rev() {
-        let column = &matrix[k * rows..(k + 1) * rows];
-        let (head, tail) = x[k..columns].split_at_mut(1);
-        head[0] = (head[0] - dot(&column[k + 1..columns], tail)) / column[k];
+    Arch::new().dispatch(BackSubstitution {
+        matrix,
+        columns,
+        pivots,
+        x,
+    });
+}
+
+struct BackSubstitution<'a> {
+    matrix: &'a [f64],
+    columns: usize,
+    pivots: usize,
+    x: &'a mut [f64],
+}
+
+impl WithSimd for BackSubstitution<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let rows = self.columns + 1;
+        for k in (0..self.pivots).rev() {
+            let column = &self.matrix[k * rows..(k + 1) * rows];
+            let (head, tail) = self.x[k..self.columns].split_at_mut(1);
+            let sum = product::dot(simd, &column[k + 1..self.columns], tail);
+            head[0] = (head[0] - sum) / column[k];
+        }
     }
 }
 
@@ -169,25 +217,6 @@ pub(crate) fn forward_substitute(matrix: &[f64], columns: usize, pivots: usize, 
             *x -= head[0] * l;
         }
     }
-}
-
-/// In four strands, so that the processor need not wait for each sum.
-#[inline(always)]
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a4.zip(b4) {
-        for k in 0..4 {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    (sums[0] + sums[2]) + (sums[1] + sums[3]) + tail
 }
 
 #[cfg(test)]

@@ -196,8 +196,8 @@ impl<G: Group> Graph<G> {
         index.ok_or(Error::UnknownKey { key })
     }
 
-    /// That every pose hangs on a prior or a fixed pose, by any factors.
-    pub(crate) fn check_held(&self) -> Result<(), Error> {
+    /// Which poses hang on a prior or a fixed pose, by any factors.
+    fn anchors(&self) -> Anchors {
         let mut anchors = Anchors::default();
         anchors.resize(self.keys.len());
         for (_, bound) in self.factors.iter() {
@@ -212,11 +212,34 @@ impl<G: Group> Graph<G> {
             .enumerate()
             .filter(|(_, fixed)| **fixed);
         fixed.for_each(|(i, _)| anchors.hold(i as u32));
+        anchors
+    }
+
+    /// That every pose hangs on a prior or a fixed pose, by any factors.
+    pub(crate) fn check_held(&self) -> Result<(), Error> {
+        let anchors = self.anchors();
         let loose = (0..self.keys.len()).filter(|&i| !anchors.holds(i as u32));
         match loose.min_by_key(|&i| self.keys[i]) {
             Some(i) => Err(self.unconstrained(i)),
             None => Ok(()),
         }
+    }
+
+    /// Fixes the pose with the smallest key of every part in which nothing is held. How many parts
+    /// that were, besides the one of the smallest key of all.
+    pub fn hold_loose_parts(&mut self) -> usize {
+        let mut anchors = self.anchors();
+        let mut by_key: Vec<u32> = (0..self.keys.len() as u32).collect();
+        by_key.sort_unstable_by_key(|&i| self.keys[i as usize]);
+        let mut held = 0;
+        for (place, &i) in by_key.iter().enumerate() {
+            if !anchors.holds(i) {
+                anchors.hold(i);
+                self.is_fixed[i as usize] = true;
+                held += usize::from(place > 0);
+            }
+        }
+        held
     }
 
     pub(crate) fn unconstrained(&self, i: usize) -> Error {

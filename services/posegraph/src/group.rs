@@ -100,8 +100,7 @@ pub trait Group: Copy + Debug + PartialEq + Send + Sync + 'static {
     fn local(&self, other: &Self) -> Self::Tangent;
     /// `r = self.local(other)`, and its Jacobian with respect to a step of `other`.
     fn local_with_jacobian(&self, other: &Self) -> (Self::Tangent, Self::Matrix);
-    /// The matrix with `self * Exp(delta) = Exp(adjoint * delta) * self`, to first order where
-    /// `Exp` is not the group's exponential.
+    /// The matrix with `self * Exp(delta) = Exp(adjoint * delta) * self`.
     fn adjoint(&self) -> Self::Matrix;
     /// Whether every number is finite.
     fn is_finite(&self) -> bool;

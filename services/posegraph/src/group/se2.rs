@@ -6,10 +6,10 @@ use super::Group;
 
 /// A pose in the plane: `world_from_body`, metres and radians.
 ///
-/// Tangent vectors are `(x, y, theta)`. The step is *not* the group's exponential but the pose of
-/// these three numbers, `pose * (x, y, R(theta))`; `local` reads the three numbers of
-/// `self^-1 * other` with the angle in (-pi, pi]. This is the error of g2o's `EDGE_SE2` and of
-/// GTSAM's `BetweenFactorPose2`.
+/// Tangent vectors are `(x, y, theta)`. The step is the group's exponential, `pose * Exp(delta)`: the
+/// arc that a constant twist describes. `local` is its logarithm with the angle in `[-pi, pi]`: the
+/// error of GTSAM's `BetweenFactorPose2` (4.3). g2o takes the translation's difference itself
+/// instead, which is the same to first order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Se2 {
     /// Where the body is, in the world.
@@ -27,11 +27,68 @@ impl Se2 {
         }
     }
 
-    /// The heading in (-pi, pi].
+    /// The heading in [-pi, pi].
     #[inline(always)]
     pub fn theta(&self) -> f64 {
         self.rotation.im.atan2(self.rotation.re)
     }
+
+    /// The pose reached from the identity by a constant twist for unit time.
+    #[inline(always)]
+    pub fn exp(twist: &Vector3<f64>) -> Self {
+        let theta = twist.z;
+        let (sin_half, cos_half) = (0.5 * theta).sin_cos();
+        // sin(theta)/theta and (1 - cos(theta))/theta.
+        let half_sinc = if theta.abs() < SERIES_BELOW {
+            0.5 - theta * theta / 48.0
+        } else {
+            sin_half / theta
+        };
+        let (a, b) = (2.0 * half_sinc * cos_half, 2.0 * half_sinc * sin_half);
+        Self {
+            translation: Vector2::new(a * twist.x - b * twist.y, b * twist.x + a * twist.y),
+            rotation: UnitComplex::new_unchecked(nalgebra::Complex::new(
+                1.0 - 2.0 * sin_half * sin_half,
+                2.0 * sin_half * cos_half,
+            )),
+        }
+    }
+
+    /// The twist that reaches this pose: the inverse of [`exp`](Self::exp).
+    #[inline(always)]
+    pub fn log(&self) -> Vector3<f64> {
+        let theta = self.theta();
+        let (a, _) = half_cotangent(theta, &self.rotation);
+        let t = self.translation;
+        Vector3::new(
+            a * t.x + 0.5 * theta * t.y,
+            a * t.y - 0.5 * theta * t.x,
+            theta,
+        )
+    }
+}
+
+/// Below this angle series replace quotients that cancel: their next terms are below 1e-15.
+const SERIES_BELOW: f64 = 1e-3;
+
+/// `a = theta/2 cot(theta/2)` and `da/dtheta`. The inverse of the V matrix is
+/// `[[a, theta/2], [-theta/2, a]]`.
+#[inline(always)]
+fn half_cotangent(theta: f64, rotation: &UnitComplex<f64>) -> (f64, f64) {
+    let theta2 = theta * theta;
+    if theta.abs() < SERIES_BELOW {
+        return (1.0 - theta2 / 12.0, -theta / 6.0 * (1.0 + theta2 / 30.0));
+    }
+    // cot(theta/2) = sin / (1 - cos) = (1 + cos) / sin: whichever does not cancel.
+    let (c, s) = (rotation.re, rotation.im);
+    let cot = if c > 0.0 {
+        (1.0 + c) / s
+    } else {
+        s / (1.0 - c)
+    };
+    // 1 / sin^2(theta/2) = 1 + cot^2(theta/2).
+    let slope = 0.5 * cot - 0.25 * theta * (1.0 + cot * cot);
+    (0.5 * theta * cot, slope)
 }
 
 impl From<Isometry2<f64>> for Se2 {
@@ -87,28 +144,38 @@ impl Group for Se2 {
 
     #[inline(always)]
     fn retract(&self, delta: &Vector3<f64>) -> Self {
-        self.compose(&Self::new(delta.x, delta.y, delta.z))
+        self.compose(&Self::exp(delta))
     }
 
     #[inline(always)]
     fn local(&self, other: &Self) -> Vector3<f64> {
-        let between = self.between(other);
-        Vector3::new(
-            between.translation.x,
-            between.translation.y,
-            between.theta(),
-        )
+        self.between(other).log()
     }
 
+    /// With `rho = V^-1(theta) t`: a step `(u, w)` of `other` changes `theta` by `w` and `t` by
+    /// `R u`, hence `rho` by `V^-1 R u` plus the change of `V^-1` with `theta`.
     #[inline(always)]
     fn local_with_jacobian(&self, other: &Self) -> (Vector3<f64>, Matrix3<f64>) {
         let between = self.between(other);
+        let theta = between.theta();
+        let (a, slope) = half_cotangent(theta, &between.rotation);
+        let (t, half) = (between.translation, 0.5 * theta);
         let (c, s) = (between.rotation.re, between.rotation.im);
-        let t = between.translation;
-        (
-            Vector3::new(t.x, t.y, between.theta()),
-            Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0),
-        )
+        // V^-1 R has the same form as V^-1: a rotation and a scaling.
+        let (p, q) = (a * c + half * s, a * s - half * c);
+        let jacobian = Matrix3::new(
+            p,
+            -q,
+            slope * t.x + 0.5 * t.y,
+            q,
+            p,
+            slope * t.y - 0.5 * t.x,
+            0.0,
+            0.0,
+            1.0,
+        );
+        let r = Vector3::new(a * t.x + half * t.y, a * t.y - half * t.x, theta);
+        (r, jacobian)
     }
 
     #[inline(always)]
