@@ -76,7 +76,7 @@ const LAYERS: &[Layer] = &[
     },
     Layer {
         name: "hachi-posegraph",
-        sees: &["hachi-hal"],
+        sees: &[],
         tests_see: &[],
         because: "a pose graph has no sensor: usable by someone who has never heard of this robot",
     },
