@@ -309,6 +309,7 @@ impl Map {
         };
         if let Some(graph) = &mut self.pieces[piece.0 as usize].graph {
             graph.update(&[], &edges, &[])?;
+            graph.settle()?;
         }
         self.next_edge += edges.len() as u32;
         self.edges.extend_from_slice(&edges);
@@ -372,6 +373,7 @@ impl Map {
             return Ok(Vec::new());
         };
         graph.update(&placed, &edges, &[])?;
+        graph.settle()?;
         for (id, pose) in placed {
             let node = &mut self.nodes[id.index()];
             node.piece = target;
