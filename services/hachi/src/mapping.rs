@@ -96,7 +96,11 @@ impl Mapping {
     #[must_use]
     pub fn with_slam(mut self, store: Box<dyn SubmapStore>) -> Self {
         let base_from_lidar = self.frames.base_from_lidar;
-        self.slam = Some(SlamStage::new(self.config.slam.clone(), base_from_lidar, store));
+        self.slam = Some(SlamStage::new(
+            self.config.slam.clone(),
+            base_from_lidar,
+            store,
+        ));
         self
     }
 

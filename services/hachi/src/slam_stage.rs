@@ -109,7 +109,10 @@ impl SlamStage {
             );
         }
         for (piece, target) in &self.events.joined {
-            info!("piece {} of the map was found to lie on piece {}", piece.0, target.0);
+            info!(
+                "piece {} of the map was found to lie on piece {}",
+                piece.0, target.0
+            );
         }
         for error in &self.events.store_errors {
             if !self.store_failed {
@@ -164,7 +167,10 @@ impl SlamStage {
         let nodes = self.slam.map().nodes().to_vec();
         for node in &nodes {
             let submap = self.slam.map_mut().submap(node.id).map_err(|error| {
-                Failure::new(error, "see the message; the map without it can't be written")
+                Failure::new(
+                    error,
+                    "see the message; the map without it can't be written",
+                )
             })?;
             for p in &submap.points {
                 let placed = node.map_from_node * nalgebra::Point3::from(p.position.map(f64::from));

@@ -6,7 +6,7 @@
 
 use hachi_hal::Pose;
 use hachi_registration::{
-    Aligner, AlignerConfig, Kernel, Prior, Registration, Solver, SurfacePoint, SurfaceTarget,
+    Aligner, AlignerConfig, Kernel, Registration, Solver, SurfacePoint, SurfaceTarget,
 };
 use rayon::prelude::*;
 
@@ -22,6 +22,9 @@ const FINE_ITERATIONS: usize = 12;
 /// Iterations made in one step.
 const COARSE_AT_ONCE: usize = 8;
 const FINE_AT_ONCE: usize = 2;
+/// A direction of which the surfaces say less than this share of what they say of the best one is
+/// left to the guess: see `hachi_registration::Degeneracy`.
+const OPEN_SHARE: f64 = 0.003;
 /// Points handed to one task: fixed, for the same sums with any number of threads.
 const CHUNK: usize = 256;
 /// Cosine between normals that lie on one surface.
@@ -68,8 +71,6 @@ pub struct Alignment {
     fine: Vec<SurfacePoint>,
     guesses: Vec<Trial>,
     phase: Phase,
-    degeneracy_threshold: f64,
-    prior: Option<Prior>,
 }
 
 /// A guess, and how far it was followed.
@@ -91,14 +92,8 @@ enum Phase {
 
 impl Alignment {
     /// Begins: `source` is laid on whatever target [`Alignment::step`] is called with, from each of
-    /// `guesses` (`target_from_source`). With a prior, and one guess, only the last part is done.
-    pub fn begin(
-        &mut self,
-        source: &Surfaces,
-        guesses: &[Pose],
-        prior: Option<Prior>,
-        degeneracy_threshold: f64,
-    ) {
+    /// `guesses` (`target_from_source`).
+    pub fn begin(&mut self, source: &Surfaces, guesses: &[Pose]) {
         source.pick(COARSE_POINTS, &mut self.coarse);
         source.pick(FINE_POINTS, &mut self.fine);
         self.guesses.clear();
@@ -108,13 +103,17 @@ impl Alignment {
             done: false,
             fitness: Fitness::default(),
         }));
-        self.phase = if prior.is_some() && guesses.len() == 1 {
-            Phase::Fine
+        self.phase = if guesses.is_empty() {
+            Phase::Idle
         } else {
             Phase::Coarse
         };
-        self.prior = prior;
-        self.degeneracy_threshold = degeneracy_threshold;
+    }
+
+    /// Begins with a guess that is close: only the last part is done.
+    pub fn begin_close(&mut self, source: &Surfaces, guess: &Pose) {
+        self.begin(source, &[*guess]);
+        self.phase = Phase::Fine;
     }
 
     /// How well each guess fits, as far as it was followed with few surfaces.
@@ -138,7 +137,7 @@ impl Alignment {
     fn coarse_step(&mut self, target: &Surfaces) {
         let cell = target.voxel_m();
         let Some(index) = self.guesses.iter().position(|t| !t.done) else {
-            self.choose();
+            self.phase = Phase::Fine;
             return;
         };
         let trial = self.guesses[index];
@@ -151,7 +150,7 @@ impl Alignment {
                 scale_m: if trial.iterations == 0 { 1.0 } else { 0.4 },
             },
             solver: Solver::GaussNewton,
-            degeneracy_threshold: self.degeneracy_threshold,
+            degeneracy_threshold: OPEN_SHARE,
         };
         let found = self
             .aligner
@@ -172,19 +171,11 @@ impl Alignment {
             },
         };
         if self.guesses.iter().all(|t| t.done) {
-            self.choose();
+            self.phase = Phase::Fine;
         }
     }
 
-    /// Puts the best guess first in the queue of the last part; of equals the earlier.
-    fn choose(&mut self) {
-        self.phase = if self.guesses.is_empty() {
-            Phase::Idle
-        } else {
-            Phase::Fine
-        };
-    }
-
+    /// The guess that led farthest; of equals the earlier.
     fn best(&self) -> usize {
         let fit = |i: usize| self.guesses[i].fitness.fit_share;
         (0..self.guesses.len()).fold(0, |best, i| if fit(i) > fit(best) { i } else { best })
@@ -202,11 +193,11 @@ impl Alignment {
             rotation_epsilon_rad: 2e-4,
             kernel: Kernel::GemanMcClure { scale_m: 0.15 },
             solver: Solver::GaussNewton,
-            degeneracy_threshold: self.degeneracy_threshold,
+            degeneracy_threshold: OPEN_SHARE,
         };
-        let mut found =
-            self.aligner
-                .align(&self.fine, target, &trial.pose, self.prior.as_ref(), &config);
+        let mut found = self
+            .aligner
+            .align(&self.fine, target, &trial.pose, None, &config);
         found.iterations += iterations;
         let over = found.converged || found.pairs == 0 || found.iterations >= FINE_ITERATIONS;
         self.guesses[guess] = Trial {

@@ -14,6 +14,13 @@ use crate::map::Map;
 use crate::node::{Node, NodeId, PieceId};
 use crate::places::node_of;
 
+/// Half axes of the search ellipsoid where the place is known exactly, metres: what one sees from
+/// there, one sees from here.
+const SEARCH_LEAST_M: f64 = 4.0;
+
+/// Standard deviations of the position since the candidate that are added.
+const SEARCH_SIGMAS: f64 = 3.0;
+
 /// Alike places that are looked at for each node.
 const ALIKE: usize = 3;
 
@@ -92,7 +99,7 @@ fn alike(
     config: &SlamConfig,
 ) -> Vec<Candidate> {
     // First with the node's whole uncertainty, which is never less than that since a candidate.
-    let wide = Ellipsoid::new(node, own, config);
+    let wide = Ellipsoid::new(node, own);
     let nodes = map.nodes();
     let inside = |id: NodeId| {
         nodes
@@ -108,7 +115,7 @@ fn alike(
             continue;
         }
         let since = map.relative_covariance(old, node.id);
-        let ellipsoid = Ellipsoid::new(node, since.as_ref(), config);
+        let ellipsoid = Ellipsoid::new(node, since.as_ref());
         if map.node(old).is_some_and(|old| ellipsoid.holds(old)) {
             out.push(Candidate {
                 node: old,
@@ -123,7 +130,7 @@ fn alike(
 
 /// The nearest old node, if the graph knows well enough that it is.
 fn nearest(map: &mut Map, node: &Node, own: &Matrix6<f64>, config: &SlamConfig) -> Option<NodeId> {
-    let reach = Ellipsoid::new(node, Some(own), config);
+    let reach = Ellipsoid::new(node, Some(own));
     let distance = |old: &Node| {
         let apart = old.map_from_node.translation.vector - node.map_from_node.translation.vector;
         apart.norm()
@@ -133,7 +140,7 @@ fn nearest(map: &mut Map, node: &Node, own: &Matrix6<f64>, config: &SlamConfig) 
         .iter()
         .filter(|old| is_old(old, node, config) && reach.holds(old))
         .map(|old| (old.id, distance(old)))
-        .filter(|(_, distance)| *distance <= config.search_least_m)
+        .filter(|(_, distance)| *distance <= SEARCH_LEAST_M)
         .min_by(|a, b| a.1.total_cmp(&b.1))?
         .0;
     let since = map.relative_covariance(near, node.id)?;
@@ -161,7 +168,7 @@ struct Ellipsoid {
 
 impl Ellipsoid {
     /// Around a node, `since` being the covariance of its pose since the candidate.
-    fn new(node: &Node, since: Option<&Matrix6<f64>>, config: &SlamConfig) -> Self {
+    fn new(node: &Node, since: Option<&Matrix6<f64>>) -> Self {
         let rotation = node.map_from_node.rotation.to_rotation_matrix();
         let sigmas = since.map_or_else(nalgebra::Vector3::zeros, |since| {
             let shift = since.fixed_view::<3, 3>(0, 0).into_owned();
@@ -170,7 +177,7 @@ impl Ellipsoid {
         });
         Self {
             centre: node.map_from_node.translation.vector,
-            axes_m: sigmas.map(|s| config.search_least_m + config.search_sigmas * s),
+            axes_m: sigmas.map(|s| SEARCH_LEAST_M + SEARCH_SIGMAS * s),
         }
     }
 

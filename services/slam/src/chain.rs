@@ -5,13 +5,11 @@
 //! (along a bare corridor), or where the alignment says something absurd, odometry stands alone.
 
 use hachi_hal::Pose;
-use hachi_registration::Prior;
 use nalgebra::Matrix6;
 
-use crate::alignment::{Alignment, Fitness};
-use crate::config::SlamConfig;
+use crate::alignment::Alignment;
 use crate::growing::GrownSubmap;
-use crate::map::{Map, difference};
+use crate::map::{Map, difference, stepped};
 use crate::node::NodeId;
 use crate::surfaces::Surfaces;
 use crate::uncertainty::{bounded, invert, metric_scale, translation_first};
@@ -27,9 +25,11 @@ const ABSURD: f64 = 38.0;
 const LEAST_OVERLAP: f64 = 0.3;
 const LEAST_INLIERS: f64 = 0.5;
 
-/// Distance across surfaces that a fresh submap is expected to have, metres: what odometry's
-/// information is scaled by before the alignment has shown its own.
-const EXPECTED_RESIDUAL_M: f64 = 0.02;
+/// What the alignment with a few submaps errs by at least, metres and radians. Odometry has compared
+/// every scan with all that is within a hundred metres: where it is sure, a few submaps add nothing
+/// but their own noise; where it is not, they decide.
+const LEAST_SIGMA_M: f64 = 0.03;
+const LEAST_SIGMA_RAD: f64 = 0.006;
 
 /// Aligns a submap with those before it, in steps; keeps its buffers.
 #[derive(Debug, Default)]
@@ -39,19 +39,12 @@ pub struct ChainAlignment {
     alignment: Alignment,
     expected: Pose,
     way_information: Matrix6<f64>,
-    scale: f64,
 }
 
 impl ChainAlignment {
     /// Begins; `previous` are the nodes to align with, the last first. `false` if there is nothing
     /// to align with: then the way alone counts.
-    pub fn begin(
-        &mut self,
-        map: &mut Map,
-        grown: &GrownSubmap,
-        previous: &[NodeId],
-        config: &SlamConfig,
-    ) -> bool {
+    pub fn begin(&mut self, map: &mut Map, grown: &GrownSubmap, previous: &[NodeId]) -> bool {
         let (Some((way, covariance)), Some(last)) = (grown.way, previous.first()) else {
             return false;
         };
@@ -75,16 +68,7 @@ impl ChainAlignment {
         self.source.clear();
         self.source
             .add(&grown.submap, &Pose::identity(), [0.0; 3], REACH_M);
-        self.scale = metric_scale(&Fitness {
-            residual_m: EXPECTED_RESIDUAL_M,
-            ..Fitness::default()
-        });
-        let prior = Prior {
-            target_from_source: way,
-            information: translation_first(&self.way_information) / self.scale,
-        };
-        self.alignment
-            .begin(&self.source, &[way], Some(prior), config.degeneracy_threshold);
+        self.alignment.begin_close(&self.source, &way);
         true
     }
 
@@ -105,8 +89,11 @@ impl ChainAlignment {
         }
         let seen = found.degeneracy.projection_on_observed();
         let hessian = seen.transpose() * found.information * seen;
-        let of_surfaces = bounded(&(translation_first(&hessian) * metric_scale(fitness)));
+        let metric = translation_first(&hessian) * metric_scale(fitness);
+        let of_surfaces = bounded(&metric, LEAST_SIGMA_M, LEAST_SIGMA_RAD);
+        // The two say the same but for a small step: weighed by what each knows of it.
         let both = of_surfaces + self.way_information;
-        Some((found.target_from_source, invert(&invert(&both))))
+        let step = invert(&both) * of_surfaces * off;
+        Some((stepped(&self.expected, &step), both))
     }
 }

@@ -30,6 +30,13 @@ const AGREE_SHARE: f64 = 0.01;
 const BELIEVABLE_SHARE: f64 = 0.05;
 const BELIEVABLE_M: f64 = 1.0;
 
+/// Squared Mahalanobis distance to the graph beyond which a loop needs others that agree: of true
+/// ones one in a thousand is farther, with six degrees of freedom.
+const MOST_CHI2: f64 = 22.46;
+
+/// How many others have to agree.
+const AGREEING: usize = 2;
+
 /// Loops that wait for others to agree.
 const MOST_WAITING: usize = 16;
 
@@ -94,12 +101,7 @@ impl Closing {
         if let Some(proposed) = candidate.proposed {
             add(proposed);
         }
-        self.alignment.begin(
-            &self.source,
-            &guesses[..count],
-            None,
-            config.degeneracy_threshold,
-        );
+        self.alignment.begin(&self.source, &guesses[..count]);
         true
     }
 
@@ -118,7 +120,11 @@ impl Closing {
         config: &SlamConfig,
     ) -> Result<Proven, Refusal> {
         let (found, fitness) = (&aligned.found, &aligned.fitness);
-        let of_guess = |i: usize| self.alignment.guess_fitness(i).map_or(f32::NAN, |f| f as f32);
+        let of_guess = |i: usize| {
+            self.alignment
+                .guess_fitness(i)
+                .map_or(f32::NAN, |f| f as f32)
+        };
         if same_piece {
             entry.graph_fitness = of_guess(0);
         }
@@ -150,7 +156,7 @@ impl Closing {
 
     /// Asks the graph, and where it disagrees the other loops that it disagreed with. All loops that
     /// are to be added now; none if this one has to wait.
-    pub fn agree(&mut self, map: &mut Map, proven: &mut Proven, config: &SlamConfig) -> Vec<(LoopId, Matrix6<f64>)> {
+    pub fn agree(&mut self, map: &mut Map, proven: &mut Proven) -> Vec<(LoopId, Matrix6<f64>)> {
         let entry = &mut proven.entry;
         let chi2 = map.chi2(
             entry.candidate,
@@ -163,7 +169,7 @@ impl Closing {
             return Vec::new();
         };
         entry.chi2 = chi2 as f32;
-        if chi2 <= config.loop_most_chi2 {
+        if chi2 <= MOST_CHI2 {
             return vec![(entry.id, proven.information)];
         }
         if !believable(map, entry) {
@@ -177,7 +183,7 @@ impl Closing {
             .copied()
             .collect();
         entry.agreeing = agreeing.len() as u16;
-        if agreeing.len() < config.loop_agreeing {
+        if agreeing.len() < AGREEING {
             entry.verdict = Verdict::Waiting;
             if self.waiting.len() >= MOST_WAITING {
                 self.waiting.remove(0);
@@ -214,9 +220,12 @@ fn believable(map: &Map, entry: &LedgerEntry) -> bool {
 /// Whether two loops say the same of how the new nodes lie to the old ones.
 fn agrees(map: &Map, a: &LedgerEntry, b: &LedgerEntry) -> bool {
     let pose = |id: NodeId| map.node(id).map(|n| n.map_from_node);
-    let (Some(a_new), Some(a_old), Some(b_new), Some(b_old)) =
-        (pose(a.node), pose(a.candidate), pose(b.node), pose(b.candidate))
-    else {
+    let (Some(a_new), Some(a_old), Some(b_new), Some(b_old)) = (
+        pose(a.node),
+        pose(a.candidate),
+        pose(b.node),
+        pose(b.candidate),
+    ) else {
         return false;
     };
     if a.node == b.node {

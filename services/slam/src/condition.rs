@@ -73,13 +73,19 @@ impl fmt::Display for SlamDoubt {
         match self {
             Self::Odometry(doubt) => doubt.fmt(f),
             Self::NotRecognised { nodes } => {
-                write!(f, "the place is not known; {nodes} submaps were looked for in the map")
+                write!(
+                    f,
+                    "the place is not known; {nodes} submaps were looked for in the map"
+                )
             }
             Self::Unconfirmed { agreeing } => {
                 write!(f, "a known place fits, {agreeing} submaps agree so far")
             }
             Self::Drift { sigma_m } => {
-                write!(f, "no known place for long: the position may be {sigma_m:.1} m off")
+                write!(
+                    f,
+                    "no known place for long: the position may be {sigma_m:.1} m off"
+                )
             }
         }
     }

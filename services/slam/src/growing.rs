@@ -12,6 +12,16 @@ use crate::node::levelled;
 use crate::submap::{Submap, SubmapBuilder};
 use crate::uncertainty::WayCovariance;
 
+/// A node is not fixed before this many scans: what it costs is spread over them.
+const LEAST_SCANS: usize = 10;
+
+/// A scan joins the submap when the robot has moved this far since the last that did, or turned.
+const SCAN_EVERY_M: f64 = 0.2;
+const SCAN_EVERY_RAD: f64 = 0.15;
+
+/// Points of one scan that join, evenly picked: a 64-beam scan has more than cubes can tell apart.
+const SCAN_POINTS: usize = 10_000;
+
 /// A finished submap.
 #[derive(Debug)]
 pub struct GrownSubmap {
@@ -87,7 +97,8 @@ impl Growing {
                 );
                 let open = Some(&scan.open).filter(|open| open.any());
                 let noise = &config.odometry_noise;
-                self.way.add(noise, &rotation, moved_m, turned, open, carried);
+                self.way
+                    .add(noise, &rotation, moved_m, turned, open, carried);
             }
             None => self.begin(scan, up),
         }
@@ -107,7 +118,7 @@ impl Growing {
     }
 
     /// Whether this scan joins the submap: it was placed, and shows something new.
-    pub fn joins(&self, odom_from_base: &Pose, condition: &Condition, config: &SlamConfig) -> bool {
+    pub fn joins(&self, odom_from_base: &Pose, condition: &Condition) -> bool {
         let placed = matches!(
             condition,
             Condition::Ok | Condition::Degraded(hachi_odometry::Doubt::Unobserved { .. })
@@ -115,14 +126,14 @@ impl Growing {
         // Not begun: it begins with this one.
         let fresh = self.begun.and_then(|b| b.joined_at).is_none_or(|at| {
             let moved = at.inv_mul(odom_from_base);
-            moved.translation.vector.norm() >= config.scan_every_m
-                || moved.rotation.angle() >= config.scan_every_rad
+            moved.translation.vector.norm() >= SCAN_EVERY_M
+                || moved.rotation.angle() >= SCAN_EVERY_RAD
         });
         placed && fresh
     }
 
     /// Adds the scan's points.
-    pub fn join(&mut self, scan: &ScanInput<'_>, config: &SlamConfig) {
+    pub fn join(&mut self, scan: &ScanInput<'_>) {
         let Some(begun) = &mut self.begun else {
             return;
         };
@@ -131,7 +142,7 @@ impl Growing {
         let pose = node_from_base.cast::<f32>();
         let (rotation, shift) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
         let eye = (node_from_base * nalgebra::Point3::from(scan.base_from_sensor)).cast::<f32>();
-        let stride = scan.points.len().div_ceil(config.scan_points.max(1)).max(1);
+        let stride = scan.points.len().div_ceil(SCAN_POINTS).max(1);
         let placed = scan.points.iter().step_by(stride).map(|p| {
             let position = rotation * nalgebra::Vector3::from(p.position()) + shift;
             (position.into(), p.intensity)
@@ -144,7 +155,7 @@ impl Growing {
         let (Some(begun), Some(last)) = (&self.begun, &self.last) else {
             return false;
         };
-        if begun.scans < config.node_least_scans || self.builder.is_empty() {
+        if begun.scans < LEAST_SCANS || self.builder.is_empty() {
             return false;
         }
         let turned = begun.odom_from_first.rotation.angle_to(&last.rotation);

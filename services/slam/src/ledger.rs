@@ -141,12 +141,7 @@ impl Verdict {
 
     /// The verdict of a word.
     pub fn from_name(name: &str) -> Option<Self> {
-        let plain = [
-            Self::Accepted,
-            Self::Outvoted,
-            Self::Vetoed,
-            Self::Waiting,
-        ];
+        let plain = [Self::Accepted, Self::Outvoted, Self::Vetoed, Self::Waiting];
         plain
             .into_iter()
             .chain(Refusal::ALL.map(Self::Refused))
@@ -198,7 +193,13 @@ pub struct LedgerEntry {
 
 impl LedgerEntry {
     /// An entry of which nothing is known yet but the candidate.
-    pub fn new(id: LoopId, stamp: Stamp, node: NodeId, candidate: NodeId, found_by: FoundBy) -> Self {
+    pub fn new(
+        id: LoopId,
+        stamp: Stamp,
+        node: NodeId,
+        candidate: NodeId,
+        found_by: FoundBy,
+    ) -> Self {
         Self {
             id,
             stamp,
@@ -252,7 +253,10 @@ mod tests {
     #[test]
     fn every_verdict_is_found_by_its_word() {
         let refused = Refusal::ALL.map(Verdict::Refused);
-        for verdict in refused.into_iter().chain([Verdict::Accepted, Verdict::Outvoted]) {
+        for verdict in refused
+            .into_iter()
+            .chain([Verdict::Accepted, Verdict::Outvoted])
+        {
             assert_eq!(Verdict::from_name(verdict.name()), Some(verdict));
         }
         assert_eq!(Verdict::from_name("perhaps"), None);

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use hachi_hal::{Pose, Stamp};
+use hachi_hal::{Pose, Rotation, Stamp};
 use nalgebra::{Matrix6, Vector6};
 
 use crate::cache::SubmapCache;
@@ -27,9 +27,10 @@ const MOVED_RAD: f64 = 1e-5;
 /// Old poses are written again after so many new nodes; from the edges they can be had at any time.
 const POSES_EVERY: usize = 50;
 
-/// A loop whose error is this many times the limit is outvoted: the rest of the graph does not
-/// believe it.
-const OUTVOTED: f64 = 2.0;
+/// A loop farther than this from where the graph has its nodes, in squared standard deviations of its
+/// own, is outvoted: the rest of the graph does not believe it. Twice what one in a thousand true ones
+/// exceeds.
+const OUTVOTED_CHI2: f64 = 45.0;
 
 /// Nodes that hang together.
 #[derive(Debug)]
@@ -62,7 +63,6 @@ pub struct Map {
     store: Box<dyn SubmapStore>,
     cache: SubmapCache,
     next_edge: u32,
-    most_chi2: f64,
     pending: Pending,
 }
 
@@ -92,7 +92,7 @@ impl std::fmt::Debug for Map {
 
 impl Map {
     /// An empty map.
-    pub fn new(store: Box<dyn SubmapStore>, submap_memory_bytes: usize, most_chi2: f64) -> Self {
+    pub fn new(store: Box<dyn SubmapStore>, submap_memory_bytes: usize) -> Self {
         Self {
             nodes: Vec::new(),
             edges: Vec::new(),
@@ -102,7 +102,6 @@ impl Map {
             store,
             cache: SubmapCache::new(submap_memory_bytes),
             next_edge: 0,
-            most_chi2,
             pending: Pending::default(),
         }
     }
@@ -116,10 +115,9 @@ impl Map {
         saved: SavedMap,
         store: Box<dyn SubmapStore>,
         submap_memory_bytes: usize,
-        most_chi2: f64,
     ) -> Result<Self, ResumeError> {
         saved.check()?;
-        let mut map = Self::new(store, submap_memory_bytes, most_chi2);
+        let mut map = Self::new(store, submap_memory_bytes);
         for (node, bytes) in &saved.descriptors {
             map.places.insert_bytes(*node, bytes);
         }
@@ -309,6 +307,7 @@ impl Map {
         };
         if let Some(graph) = &mut self.pieces[piece.0 as usize].graph {
             graph.update(&[], &edges, &[])?;
+            graph.settle()?;
         }
         self.next_edge += edges.len() as u32;
         self.edges.extend_from_slice(&edges);
@@ -346,7 +345,12 @@ impl Map {
             .collect();
         let placed: Vec<(NodeId, Pose)> = members
             .iter()
-            .map(|id| (*id, target_from_piece * self.nodes[id.index()].map_from_node))
+            .map(|id| {
+                (
+                    *id,
+                    target_from_piece * self.nodes[id.index()].map_from_node,
+                )
+            })
             .collect();
         let belongs = |id: NodeId| self.nodes.get(id.index()).is_some_and(|n| n.piece == piece);
         let mut edges: Vec<Edge> = self
@@ -372,6 +376,7 @@ impl Map {
             return Ok(Vec::new());
         };
         graph.update(&placed, &edges, &[])?;
+        graph.settle()?;
         for (id, pose) in placed {
             let node = &mut self.nodes[id.index()];
             node.piece = target;
@@ -438,7 +443,7 @@ impl Map {
             let Some(entry) = self.ledger.get_mut(id.0 as usize) else {
                 continue;
             };
-            let outvoted = graph.chi2(edge) > OUTVOTED * self.most_chi2;
+            let outvoted = graph.chi2(edge) > OUTVOTED_CHI2;
             let verdict = match entry.verdict {
                 Verdict::Accepted if outvoted => Verdict::Outvoted,
                 Verdict::Outvoted if !outvoted => Verdict::Accepted,
@@ -565,6 +570,13 @@ impl Map {
         pending.joined.clear();
         Ok(())
     }
+}
+
+/// The pose after a small step on its right, translation first.
+pub fn stepped(pose: &Pose, step: &Vector6<f64>) -> Pose {
+    let shift = step.fixed_rows::<3>(0).into_owned();
+    let turn = Rotation::from_scaled_axis(step.fixed_rows::<3>(3).into_owned());
+    pose * Pose::from_parts(shift.into(), turn)
 }
 
 /// The step on the right of `from` that leads to `to`: translation first.

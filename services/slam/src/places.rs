@@ -53,7 +53,9 @@ impl Places {
 
     /// The bytes of the place described last.
     pub fn bytes(&self) -> Vec<u8> {
-        self.views.first().map_or_else(Vec::new, Descriptor::to_bytes)
+        self.views
+            .first()
+            .map_or_else(Vec::new, Descriptor::to_bytes)
     }
 
     /// Remembers the place described last as a node's.

@@ -153,8 +153,7 @@ const FARTHEST_M: f64 = 1e7;
 
 fn is_pose(pose: &Pose) -> bool {
     let near = |c: &f64| c.abs() < FARTHEST_M;
-    pose.translation.vector.iter().all(near)
-        && (pose.rotation.as_ref().norm() - 1.0).abs() < 1e-6
+    pose.translation.vector.iter().all(near) && (pose.rotation.as_ref().norm() - 1.0).abs() < 1e-6
 }
 
 fn is_information(information: &Matrix6<f64>) -> bool {

@@ -9,8 +9,8 @@ use nalgebra::Matrix6;
 
 use crate::condition::{SlamCondition, SlamDoubt};
 use crate::config::SlamConfig;
-use crate::growing::{Growing, GrownSubmap};
 use crate::graph::GraphError;
+use crate::growing::{Growing, GrownSubmap};
 use crate::input::{ScanInput, SlamEstimate, SlamEvents};
 use crate::ledger::{LedgerEntry, LoopId};
 use crate::map::{Map, ResumeError};
@@ -52,7 +52,7 @@ impl Slam {
     pub fn new(config: SlamConfig, store: Box<dyn SubmapStore>) -> Self {
         let memory = config.submap_memory_mb.saturating_mul(1 << 20);
         Self {
-            map: Map::new(store, memory, config.loop_most_chi2),
+            map: Map::new(store, memory),
             growing: Growing::default(),
             waiting: VecDeque::new(),
             workshop: Workshop::default(),
@@ -76,7 +76,7 @@ impl Slam {
         store: Box<dyn SubmapStore>,
     ) -> Result<Self, ResumeError> {
         let memory = config.submap_memory_mb.saturating_mul(1 << 20);
-        let map = Map::resume(saved, store, memory, config.loop_most_chi2)?;
+        let map = Map::resume(saved, store, memory)?;
         let session = map.sessions();
         let mut slam = Self::new(config, Box::new(MemoryStore::default()));
         slam.map = map;
@@ -86,7 +86,7 @@ impl Slam {
 
     /// Whether [`Slam::step`] will look at the points of a scan that odometry placed here.
     pub fn wants_points(&self, odom_from_base: &Pose, condition: &Condition) -> bool {
-        self.up.is_none() || self.growing.joins(odom_from_base, condition, &self.config)
+        self.up.is_none() || self.growing.joins(odom_from_base, condition)
     }
 
     /// One scan; `events` is emptied first.
@@ -98,18 +98,20 @@ impl Slam {
             self.hand_over(rest, events);
             return self.estimate(scan);
         }
-        if self.growing.is_full(&self.config) {
+        let full = self.growing.is_full(&self.config);
+        if full {
             let grown = self.growing.take(scan, &up);
             self.hand_over(grown, events);
         }
         self.growing.follow(scan, &up, &self.config);
-        if self.growing.joins(&scan.odom_from_base, &scan.condition, &self.config) {
-            self.growing.join(scan, &self.config);
+        if self.growing.joins(&scan.odom_from_base, &scan.condition) {
+            self.growing.join(scan);
         }
-        let steps = if self.waiting.is_empty() {
-            STEPS
-        } else {
-            STEPS_BEHIND
+        let steps = match self.waiting.len() {
+            // Shaping a submap's surfaces was work enough.
+            1 if full && self.workshop.is_free() => 0,
+            0 => STEPS,
+            _ => STEPS_BEHIND,
         };
         self.work(steps, events);
         self.estimate(scan)
@@ -156,18 +158,18 @@ impl Slam {
 
     /// Proposes that a node is near an old one, at `candidate_from_node`: it is checked like any other
     /// candidate with the work of the next scans. `false` if there are no such nodes.
-    pub fn propose(
-        &mut self,
-        node: NodeId,
-        candidate: NodeId,
-        candidate_from_node: &Pose,
-    ) -> bool {
+    pub fn propose(&mut self, node: NodeId, candidate: NodeId, candidate_from_node: &Pose) -> bool {
         let there = |id| self.map.node(id).is_some();
         let known = there(node) && there(candidate) && node != candidate;
         if known {
             self.workshop.propose(node, candidate, candidate_from_node);
         }
         known
+    }
+
+    /// What the next step of work does, in a word, for those who measure.
+    pub fn activity(&self) -> &'static str {
+        self.workshop.activity()
     }
 
     /// The settings.
@@ -226,7 +228,10 @@ impl Slam {
                 return;
             }
             let hurry = !self.waiting.is_empty();
-            match self.workshop.step(&mut self.map, hurry, &self.config, events) {
+            match self
+                .workshop
+                .step(&mut self.map, hurry, &self.config, events)
+            {
                 Work::Going => {}
                 Work::Moved => self.take_over(),
             }
@@ -282,4 +287,3 @@ impl Slam {
         (*odometry).into()
     }
 }
-

@@ -424,7 +424,10 @@ mod tests {
         for p in &submap.points {
             let [x, y, z] = p.position;
             if x < 3.0 && x.abs() < 3.5 && y.abs() < 3.5 {
-                assert!(p.normal[2] > 0.99, "the floor looks up at the sensor: {p:?}");
+                assert!(
+                    p.normal[2] > 0.99,
+                    "the floor looks up at the sensor: {p:?}"
+                );
                 assert_eq!(p.intensity, 40);
             }
             if z > 0.0 && z < 1.4 && y.abs() < 3.5 {
@@ -438,7 +441,12 @@ mod tests {
     fn a_large_scene_makes_larger_cubes_and_never_more_points() {
         let mut builder = SubmapBuilder::default();
         for _ in 0..3 {
-            builder.add([0.0; 3], corner(0.02).into_iter().map(|(p, i)| (p.map(|c| c * 8.0), i)));
+            builder.add(
+                [0.0; 3],
+                corner(0.02)
+                    .into_iter()
+                    .map(|(p, i)| (p.map(|c| c * 8.0), i)),
+            );
         }
         let mut submap = Submap::default();
         builder.finish(&mut submap);
@@ -449,7 +457,11 @@ mod tests {
     #[test]
     fn points_that_are_not_numbers_are_passed_over() {
         let mut builder = SubmapBuilder::default();
-        let odd = [[f32::NAN, 0.0, 0.0], [f32::INFINITY, 1.0, 1.0], [1e9, 0.0, 0.0]];
+        let odd = [
+            [f32::NAN, 0.0, 0.0],
+            [f32::INFINITY, 1.0, 1.0],
+            [1e9, 0.0, 0.0],
+        ];
         builder.add([0.0; 3], odd.into_iter().map(|p| (p, f32::NAN)));
         assert!(builder.is_empty());
         let mut submap = Submap::default();

@@ -28,13 +28,20 @@ impl Surfaces {
 
     /// Adds a submap that lies at `frame_from_node`; those of its surfaces that are within
     /// `radius_m` of `centre` (both in the common frame).
-    pub fn add(&mut self, submap: &Submap, frame_from_node: &Pose, centre: [f32; 3], radius_m: f32) {
+    pub fn add(
+        &mut self,
+        submap: &Submap,
+        frame_from_node: &Pose,
+        centre: [f32; 3],
+        radius_m: f32,
+    ) {
         let pose = frame_from_node.cast::<f32>();
         let (rotation, shift) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
         let near = radius_m * radius_m;
         self.voxel_m = self.voxel_m.max(submap.voxel_m);
         for p in &submap.points {
-            let position: [f32; 3] = (rotation * nalgebra::Vector3::from(p.position) + shift).into();
+            let position: [f32; 3] =
+                (rotation * nalgebra::Vector3::from(p.position) + shift).into();
             let distance_sq: f32 = (0..3).map(|a| (position[a] - centre[a]).powi(2)).sum();
             if distance_sq <= near {
                 self.points.push(SurfacePoint {
@@ -48,7 +55,8 @@ impl Surfaces {
     /// Makes it ready to be aligned to.
     pub fn index(&mut self) {
         self.positions.clear();
-        self.positions.extend(self.points.iter().map(|p| p.position));
+        self.positions
+            .extend(self.points.iter().map(|p| p.position));
         self.tree.build(&self.positions);
     }
 

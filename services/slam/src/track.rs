@@ -67,7 +67,10 @@ mod tests {
         for tenths in 1..250 {
             assert!((at(tenths) - at(tenths - 1)).norm() < 0.102, "{tenths}");
         }
-        assert_eq!(corrected(&[], Stamp::from_nanos(0), &Pose::identity()), None);
+        assert_eq!(
+            corrected(&[], Stamp::from_nanos(0), &Pose::identity()),
+            None
+        );
     }
 
     #[test]

@@ -28,8 +28,8 @@ const PAIRS_ALIKE: f64 = 50.0;
 const LEAST_RESIDUAL_M: f64 = 0.01;
 
 /// What no number of pairs can mend: metres and radians, one standard deviation.
-const LEAST_SIGMA_M: f64 = 0.01;
-const LEAST_SIGMA_RAD: f64 = 0.001;
+const LEAST_SIGMA_M: f64 = 0.015;
+const LEAST_SIGMA_RAD: f64 = 0.003;
 
 /// Standard deviation of a direction that nothing was said of, metres and radians: as good as
 /// unknown, and the matrix stays positive definite.
@@ -58,9 +58,9 @@ pub struct OdometryNoise {
 impl Default for OdometryNoise {
     fn default() -> Self {
         Self {
-            metres_per_root_metre: 0.006,
-            radians_per_root_metre: 0.0008,
-            radians_per_root_radian: 0.001,
+            metres_per_root_metre: 0.01,
+            radians_per_root_metre: 0.002,
+            radians_per_root_radian: 0.002,
             open_share: 0.1,
             carried_m: 0.05,
             carried_rad: 0.02,
@@ -98,10 +98,7 @@ impl WayCovariance {
         let shift = noise.metres_per_root_metre.powi(2) * moved_m;
         let turn = noise.radians_per_root_metre.powi(2) * moved_m
             + noise.radians_per_root_radian.powi(2) * turned_rad;
-        let (mut shift, mut turn) = (
-            Matrix3::identity() * shift,
-            Matrix3::identity() * turn,
-        );
+        let (mut shift, mut turn) = (Matrix3::identity() * shift, Matrix3::identity() * turn);
         if let Some(open) = open {
             let rotation = node_from_base.to_rotation_matrix();
             for direction in &open.directions[..open.translations] {
@@ -135,7 +132,7 @@ pub fn of_alignment(found: &Registration, fitness: &Fitness) -> Matrix6<f64> {
     let seen = found.degeneracy.projection_on_observed();
     let hessian = seen.transpose() * found.information * seen;
     let metric = translation_first(&hessian) * metric_scale(fitness);
-    bounded(&metric)
+    bounded(&metric, LEAST_SIGMA_M, LEAST_SIGMA_RAD)
 }
 
 /// What GICP's Hessian has to be multiplied by to be information in metres and radians.
@@ -144,10 +141,10 @@ pub fn metric_scale(fitness: &Fitness) -> f64 {
     1.0 / (PAIR_WEIGHT * residual * residual * PAIRS_ALIKE)
 }
 
-/// Information with the least errors of any alignment, and something small where it had none.
-pub fn bounded(information: &Matrix6<f64>) -> Matrix6<f64> {
+/// Information with errors no smaller than these, and something small where it had none.
+pub fn bounded(information: &Matrix6<f64>, least_m: f64, least_rad: f64) -> Matrix6<f64> {
     let unknown = sigmas(UNKNOWN_M, UNKNOWN_RAD).map(|s| 1.0 / (s * s));
-    let least = sigmas(LEAST_SIGMA_M, LEAST_SIGMA_RAD);
+    let least = sigmas(least_m, least_rad);
     let floor = Matrix6::from_diagonal(&least.component_mul(&least));
     let positive = (information + information.transpose()) * 0.5 + Matrix6::from_diagonal(&unknown);
     invert(&(invert(&positive) + floor))

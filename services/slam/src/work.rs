@@ -83,6 +83,18 @@ impl Workshop {
         !matches!(self.stage, Stage::Idle) || !self.proposed.is_empty()
     }
 
+    /// What the next step does, in a word, for those who measure.
+    pub fn activity(&self) -> &'static str {
+        match &self.stage {
+            Stage::Idle => "idle",
+            Stage::Aligning(_) => "aligning",
+            Stage::Fixing(..) => "fixing",
+            Stage::Looking(_) => "looking",
+            Stage::Proving { .. } => "laying out",
+            Stage::Aligned { .. } => "proving",
+        }
+    }
+
     /// Whether the next submap can be begun with.
     pub fn is_free(&self) -> bool {
         matches!(self.stage, Stage::Idle)
@@ -154,7 +166,7 @@ impl Workshop {
             .take(config.chain_submaps)
             .copied()
             .collect();
-        self.stage = if self.chain.begin(map, &grown, &previous, config) {
+        self.stage = if self.chain.begin(map, &grown, &previous) {
             Stage::Aligning(Box::new(grown))
         } else {
             let way = grown.way.map(|(way, c)| (way, c.information()));
@@ -190,7 +202,9 @@ impl Workshop {
                 self.look(node, map, config);
                 Work::Going
             }
-            Stage::Proving { node, rest } => self.prove_next(node, rest, map, hurry, config, events),
+            Stage::Proving { node, rest } => {
+                self.prove_next(node, rest, map, hurry, config, events)
+            }
             Stage::Aligned {
                 node,
                 rest,
@@ -332,7 +346,7 @@ impl Workshop {
             }
         };
         if same_piece {
-            let loops = self.closing.agree(map, &mut proven, config);
+            let loops = self.closing.agree(map, &mut proven);
             map.close_entry(proven.entry);
             events.ledger.push(proven.entry);
             return self.close(&loops, map, events);

@@ -58,7 +58,9 @@ pub enum MapError {
         what: String,
     },
     /// It may not be written.
-    #[error("{path} can't be written: give hachi the right to write it, or copy it to where it can be")]
+    #[error(
+        "{path} can't be written: give hachi the right to write it, or copy it to where it can be"
+    )]
     ReadOnly {
         /// The path.
         path: PathBuf,

@@ -80,7 +80,10 @@ impl MapFile {
             transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
             transaction.pragma_update(None, "user_version", VERSION)?;
             transaction.execute_batch(TABLES)?;
-            let about = [("platform", &identity.platform), ("sensor", &identity.sensor)];
+            let about = [
+                ("platform", &identity.platform),
+                ("sensor", &identity.sensor),
+            ];
             for (key, value) in about {
                 transaction.execute(
                     "INSERT INTO about (key, value) VALUES (?1, ?2)",
@@ -115,9 +118,11 @@ impl MapFile {
         if access == Access::Write {
             write_safely(&connection).map_err(problem)?;
         }
-        let mut about = |key: &str| -> Result<String, MapError> {
+        let about = |key: &str| -> Result<String, MapError> {
             connection
-                .query_row("SELECT value FROM about WHERE key = ?1", [key], |row| row.get(0))
+                .query_row("SELECT value FROM about WHERE key = ?1", [key], |row| {
+                    row.get(0)
+                })
                 .optional()
                 .map_err(problem)
                 .map(Option::unwrap_or_default)
@@ -327,7 +332,9 @@ fn put(transaction: &Transaction<'_>, change: &MapChange<'_>) -> rusqlite::Resul
     for new in change.nodes {
         let n = &new.node;
         transaction
-            .prepare_cached("INSERT OR REPLACE INTO node VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)")?
+            .prepare_cached(
+                "INSERT OR REPLACE INTO node VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+            )?
             .execute(params![
                 n.id.0,
                 n.session,

@@ -31,7 +31,10 @@ pub(crate) fn matrix_bytes(matrix: &Matrix6<f64>) -> [u8; 168] {
 fn numbers<const N: usize>(row: &Row<'_>, column: usize) -> rusqlite::Result<[f64; N]> {
     let bytes = row.get_ref(column)?.as_blob()?;
     if bytes.len() != 8 * N {
-        return Err(odd(column, format!("{} bytes where {} belong", bytes.len(), 8 * N)));
+        return Err(odd(
+            column,
+            format!("{} bytes where {} belong", bytes.len(), 8 * N),
+        ));
     }
     let mut out = [0.0; N];
     for (number, chunk) in out.iter_mut().zip(bytes.chunks_exact(8)) {
