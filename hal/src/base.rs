@@ -110,6 +110,15 @@ impl BaseCommand {
         self.stamp > now + Self::FUTURE_SLACK_NS
     }
 
+    /// Whether it makes the base move in any way, rather than stand still.
+    pub fn moves(&self) -> bool {
+        match &self.action {
+            BaseAction::Stop => false,
+            BaseAction::Move(velocity) => !velocity.is_zero(),
+            BaseAction::Pose(_) | BaseAction::StandUp | BaseAction::LieDown => true,
+        }
+    }
+
     /// Whether every number in it is finite.
     pub fn is_finite(&self) -> bool {
         match &self.action {

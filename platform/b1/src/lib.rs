@@ -54,8 +54,8 @@ pub const B1: Quadruped = Quadruped {
     },
     contact: ContactConfig {
         // Users report constant 20 to 28 whatever the load: not used.
-        foot_force: None,
-        torque: ContactConfig::TORQUE,
+        counts_per_share: None,
+        load: ContactConfig::LOAD,
     },
     endpoints: Endpoints {
         high: ([192, 168, 123, 220], 8082),

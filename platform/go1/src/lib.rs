@@ -9,7 +9,7 @@
 
 use hachi_hal::Vector3;
 use hachi_unitree::command::{CommandLimits, VelocityLimits};
-use hachi_unitree::contact::{ContactConfig, Hysteresis};
+use hachi_unitree::contact::ContactConfig;
 use hachi_unitree::frame::Layout;
 use hachi_unitree::{Endpoints, JointLimits, LegGeometry, Quadruped, Span};
 
@@ -61,13 +61,10 @@ pub const GO1: Quadruped = Quadruped {
         foot_raise_height: Span::new(-0.06, 0.03),
     },
     contact: ContactConfig {
-        // Public projects use 40 (legged_control) to 80 counts (A1-QP-MPC) above the zero; Leg-KILO
-        // leaves 20 between touch and release.
-        foot_force: Some(Hysteresis {
-            touch: 50.0,
-            release: 30.0,
-        }),
-        torque: ContactConfig::TORQUE,
+        // Public projects see a foot stand above 40 (legged_control) to 80 counts (A1-QP-MPC) over
+        // its zero, which is about half a share.
+        counts_per_share: Some(100.0),
+        load: ContactConfig::LOAD,
     },
     endpoints: Endpoints {
         high: ([192, 168, 123, 161], 8082),

@@ -2,11 +2,14 @@
 //!
 //! In: a leg state, the direction of up, how the body turns. Out: for each foot whether it stands,
 //! how surely, and the load that its torques tell; and from which source. Three sources are
-//! followed side by side: foot sensors (counts above a zero that is learnt for each foot while it
-//! is in the air), torques (static vertical force, `J' f = -tau`), and bare kinematics (feet that
-//! are lowest and keep still against each other). The sensors are used while they agree with the
-//! others: a B1's are constant on many robots, a Go1's are all zero on old firmware and drift with
-//! temperature.
+//! followed side by side: foot sensors, torques (static vertical force, `J' f = -tau`), and bare
+//! kinematics (feet that are lowest and keep still against each other).
+//!
+//! Foot sensors count in a unit of their own from a zero of their own, both different from foot to
+//! foot and drifting with temperature: the zero is learnt while the torques say that the foot is in
+//! the air, the unit while they say that it stands. Until then, and where sensors and torques
+//! disagree, the sensors are not used: a B1's are constant on many robots, a Go1's are all zero on
+//! old firmware.
 
 use hachi_hal::{Leg, LegKinematics, LegState, Stamp, Vector3};
 
@@ -56,17 +59,17 @@ impl Hysteresis {
 /// How a robot's feet tell that they stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactConfig {
-    /// Thresholds of the foot sensors, counts above their zero; `None` where they are not to be
-    /// used at all.
-    pub foot_force: Option<Hysteresis>,
-    /// Thresholds of the vertical force, as shares of a quarter of the robot's weight.
-    pub torque: Hysteresis,
+    /// Counts that a foot sensor shows above its zero under a quarter of the robot's weight, as far
+    /// as is known before it is learnt; `None` where the sensors are not to be used at all.
+    pub counts_per_share: Option<f64>,
+    /// Thresholds of the load, as shares of a quarter of the robot's weight.
+    pub load: Hysteresis,
 }
 
 impl ContactConfig {
     /// Half of a foot's share when standing, and a third: a trot loads a foot with twice its share,
     /// and a swinging leg's own weight and acceleration look like up to a third of it.
-    pub const TORQUE: Hysteresis = Hysteresis {
+    pub const LOAD: Hysteresis = Hysteresis {
         touch: 0.5,
         release: 0.33,
     };
@@ -130,42 +133,69 @@ const DISTRUST: Hysteresis = Hysteresis {
     touch: 0.35,
     release: 0.15,
 };
-/// A foot's zero is learnt after it has been unloaded for this long, ns.
-const UNLOADED_NS: i64 = 30_000_000;
-/// Time in which the first zero is learnt, s, and in which it follows the drift afterwards.
-const ZERO_FIRST_S: f64 = 0.1;
-const ZERO_DRIFT_S: f64 = 10.0;
-/// Unloaded time after which the zero is known, s.
-const ZERO_KNOWN_S: f64 = 0.3;
+/// A foot teaches its sensor's zero after it has been in the air for this long, and its unit after
+/// it has stood for this long, ns.
+const STEADY_NS: i64 = 30_000_000;
+/// Time in which zero and unit are first learnt, s, and in which they follow the drift afterwards.
+const FIRST_S: f64 = 0.1;
+const DRIFT_S: f64 = 10.0;
+/// Time of learning after which they are known, s.
+const KNOWN_S: f64 = 0.3;
+/// A sensor that shows less than this many counts for a foot's share feels no load.
+const LEAST_COUNTS: f64 = 8.0;
 /// Gaps longer than this teach nothing, s.
 const LONGEST_STEP_S: f64 = 0.1;
 
-/// Zero of one foot's sensor.
-#[derive(Debug, Clone, Copy, Default)]
-struct Zero {
-    counts: f64,
-    /// Unloaded time it was learnt from, s.
-    learnt_s: f64,
-    unloaded_since: Option<Stamp>,
+/// A value that is learnt at moments that are steady.
+#[derive(Debug, Clone, Copy)]
+struct Learnt {
+    value: f64,
+    for_s: f64,
+    steady_since: Option<Stamp>,
 }
 
-impl Zero {
-    fn learn(&mut self, raw: f64, unloaded: bool, now: Stamp, dt_s: f64) {
-        if !unloaded {
-            self.unloaded_since = None;
+impl Learnt {
+    const fn from(value: f64) -> Self {
+        Self {
+            value,
+            for_s: 0.0,
+            steady_since: None,
+        }
+    }
+
+    fn learn(&mut self, seen: f64, steady: bool, now: Stamp, dt_s: f64) {
+        if !steady {
+            self.steady_since = None;
             return;
         }
-        let since = *self.unloaded_since.get_or_insert(now);
-        if now.nanos_since(since) < UNLOADED_NS {
+        let since = *self.steady_since.get_or_insert(now);
+        if now.nanos_since(since) < STEADY_NS {
             return;
         }
-        let over_s = if self.learnt_s < ZERO_KNOWN_S {
-            ZERO_FIRST_S
-        } else {
-            ZERO_DRIFT_S
-        };
-        self.counts += (raw - self.counts) * (dt_s / over_s).min(1.0);
-        self.learnt_s = (self.learnt_s + dt_s).min(ZERO_KNOWN_S);
+        let over_s = if self.is_known() { DRIFT_S } else { FIRST_S };
+        self.value += (seen - self.value) * (dt_s / over_s).min(1.0);
+        self.for_s = (self.for_s + dt_s).min(KNOWN_S);
+    }
+
+    fn is_known(&self) -> bool {
+        self.for_s >= KNOWN_S
+    }
+}
+
+/// One foot's sensor.
+#[derive(Debug, Clone, Copy)]
+struct Sensor {
+    /// Counts in the air.
+    zero: Learnt,
+    /// Counts above zero per share of load.
+    unit: Learnt,
+}
+
+impl Sensor {
+    /// The load, in shares; `None` while it can't be told.
+    fn load(&self, raw: f64) -> Option<f64> {
+        let tells = self.zero.is_known() && self.unit.value >= LEAST_COUNTS;
+        tells.then(|| (raw - self.zero.value) / self.unit.value)
     }
 }
 
@@ -176,7 +206,7 @@ pub struct ContactDetector<K> {
     config: ContactConfig,
     /// A quarter of the robot's weight, N.
     share_n: f64,
-    zeros: [Zero; 4],
+    sensors: [Sensor; 4],
     by_force: [bool; 4],
     by_torque: [bool; 4],
     by_place: [bool; 4],
@@ -195,7 +225,10 @@ impl<K: LegKinematics> ContactDetector<K> {
             legs,
             config,
             share_n: mass_kg * GRAVITY / 4.0,
-            zeros: [Zero::default(); 4],
+            sensors: [Sensor {
+                zero: Learnt::from(0.0),
+                unit: Learnt::from(config.counts_per_share.unwrap_or(0.0)),
+            }; 4],
             by_force: [false; 4],
             by_torque: [false; 4],
             by_place: [false; 4],
@@ -208,7 +241,7 @@ impl<K: LegKinematics> ContactDetector<K> {
 
     /// Counts that each foot's sensor shows in the air, as learnt so far.
     pub fn zeros(&self) -> [f64; 4] {
-        self.zeros.map(|zero| zero.counts)
+        self.sensors.map(|sensor| sensor.zero.value)
     }
 
     /// The feet at one moment.
@@ -223,28 +256,26 @@ impl<K: LegKinematics> ContactDetector<K> {
         self.follow_places(input);
         let loads = forces.map(|force| force / self.share_n);
         for (standing, load) in self.by_torque.iter_mut().zip(loads) {
-            *standing = self.config.torque.step(*standing, load);
+            *standing = self.config.load.step(*standing, load);
         }
-        let reference = if has_torques {
-            self.by_torque
-        } else {
-            self.by_place
+        let torque_loads = has_torques.then_some(&loads);
+        let reference = match torque_loads {
+            Some(_) => self.by_torque,
+            None => self.by_place,
         };
-        let sensors = self.follow_sensors(input, &loads, has_torques, &reference, dt_s);
+        let sensed = self.follow_sensors(input, torque_loads, &reference, dt_s);
 
-        let (source, standing) = match sensors {
-            Some(_) if !self.distrusted => (ContactSource::FootForce, self.by_force),
-            _ if has_torques => (ContactSource::Torque, self.by_torque),
-            _ => (ContactSource::Kinematics, self.by_place),
+        let (source, standing, loads) = match (sensed, torque_loads) {
+            (Some(sensed), _) if !self.distrusted => {
+                (ContactSource::FootForce, self.by_force, Some(sensed))
+            }
+            (_, Some(_)) => (ContactSource::Torque, self.by_torque, Some(loads)),
+            _ => (ContactSource::Kinematics, self.by_place, None),
         };
         let feet = core::array::from_fn(|i| {
-            let sureness = match (source, &sensors, &self.config.foot_force) {
-                (ContactSource::FootForce, Some(counts), Some(limits)) => {
-                    limits.confidence(counts[i])
-                }
-                (ContactSource::Torque, ..) => self.config.torque.confidence(loads[i]),
-                _ => KINEMATIC_CONFIDENCE,
-            };
+            let sureness = loads.map_or(KINEMATIC_CONFIDENCE, |loads| {
+                self.config.load.confidence(loads[i])
+            });
             let settled = self.settled(i, standing[i], now);
             FootContact {
                 standing: standing[i],
@@ -305,36 +336,40 @@ impl<K: LegKinematics> ContactDetector<K> {
         }
     }
 
-    /// Counts above zero of the foot sensors; `None` where there are none to use.
+    /// What the foot sensors say, in shares; `None` where there are none to use.
     fn follow_sensors(
         &mut self,
         input: &ContactInput<'_>,
-        loads: &[f64; 4],
-        has_torques: bool,
+        torque_loads: Option<&[f64; 4]>,
         reference: &[bool; 4],
         dt_s: f64,
     ) -> Option<[f64; 4]> {
-        let limits = self.config.foot_force?;
-        let raw = input.legs.foot_forces;
+        self.config.counts_per_share?;
+        let (raw, now) = (input.legs.foot_forces, input.legs.stamp);
         if raw == [0.0; 4] {
             return None;
         }
-        for i in 0..4 {
-            let unloaded = if has_torques {
-                loads[i] < self.config.torque.release
-            } else {
-                !reference[i]
-            };
-            self.zeros[i].learn(raw[i], unloaded, input.legs.stamp, dt_s);
+        let mut loads = [Some(0.0); 4];
+        for (i, sensor) in self.sensors.iter_mut().enumerate() {
+            let load = torque_loads.map_or(1.0, |loads| loads[i]);
+            sensor.zero.learn(raw[i], !reference[i], now, dt_s);
+            // Only torques know how much load there is.
+            let loaded = torque_loads.is_some() && reference[i] && sensor.zero.is_known();
+            let unit = (raw[i] - sensor.zero.value) / load.max(self.config.load.release);
+            sensor.unit.learn(unit, loaded, now, dt_s);
+            loads[i] = sensor.load(raw[i]);
         }
-        let counts = core::array::from_fn(|i| raw[i] - self.zeros[i].counts);
+        let [Some(a), Some(b), Some(c), Some(d)] = loads else {
+            return None;
+        };
+        let loads = [a, b, c, d];
         let mut differ = 0.0;
         for i in 0..4 {
-            self.by_force[i] = limits.step(self.by_force[i], counts[i]);
+            self.by_force[i] = self.config.load.step(self.by_force[i], loads[i]);
             differ += f64::from(u8::from(self.by_force[i] != reference[i])) / 4.0;
         }
         self.disagreement += (differ - self.disagreement) * (dt_s / JUDGED_OVER_S).min(1.0);
         self.distrusted = DISTRUST.step(self.distrusted, self.disagreement);
-        Some(counts)
+        Some(loads)
     }
 }

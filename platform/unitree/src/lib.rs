@@ -4,6 +4,7 @@
 //! | module | in | out |
 //! |---|---|---|
 //! | [`frame`] | UDP payloads | HighCmd, HighState, LowCmd, LowState, both ways |
+//! | [`fresh`] | ticks, or bytes | new, repeated, late; silent and frozen links |
 //! | [`reading`] | a state's body | hal's samples, ill values named |
 //! | [`command`] | [`hachi_hal::BaseCommand`]s | the HighCmd in force |
 //! | [`kinematics`] | joint angles | feet, Jacobians, and back |
@@ -25,8 +26,12 @@ extern crate std;
 
 pub mod command;
 pub mod contact;
+#[cfg(feature = "std")]
+pub mod device;
 pub mod footprint;
 pub mod frame;
+pub mod fresh;
+mod inertial;
 pub mod kinematics;
 pub mod odometry;
 pub mod reading;

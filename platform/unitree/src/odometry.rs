@@ -16,6 +16,7 @@ use hachi_hal::{Leg, LegKinematics, Matrix3, OdometrySample, Pose, Rotation, Sta
 use nalgebra::Translation3;
 
 use crate::contact::{ContactSource, Contacts};
+use crate::inertial::{InertialVelocity, LONGEST_GAP_S, UNKNOWN_VARIANCE};
 use crate::tracker::BodySample;
 use crate::vote::{Candidate, Verdict, vote};
 
@@ -28,8 +29,6 @@ pub struct LegOdometryConfig {
     pub gyro_sigma: f64,
     /// What a standing foot moves all the same: rubber and soft ground, m/s.
     pub foot_sigma: f64,
-    /// Acceleration after attitude and gravity are taken off, m/s².
-    pub acceleration_sigma: f64,
     /// Share of the way that is wrong in a lasting manner: lengths of legs, zeros of joints.
     pub scale_sigma: f64,
     /// Yaw of the body's own attitude, rad per square root of a second.
@@ -44,7 +43,6 @@ impl Default for LegOdometryConfig {
             joint_speed_sigma: 0.08,
             gyro_sigma: 0.01,
             foot_sigma: 0.03,
-            acceleration_sigma: 1.0,
             scale_sigma: 0.01,
             yaw_walk: 0.002,
             base_from_imu: Vector3::zeros(),
@@ -122,22 +120,13 @@ pub enum LegOdometryError {
     },
 }
 
-/// After a longer gap the last velocity says nothing about this one, s.
-const LONGEST_GAP_S: f64 = 0.1;
-/// Variance of the velocity of a robot of which nothing is known: it may run, (m/s)².
-const UNKNOWN_VARIANCE: f64 = 4.0;
 /// Feet with less confidence have no vote.
 const LEAST_CONFIDENCE: f64 = 0.15;
 
 #[derive(Debug, Clone, Copy)]
 struct Before {
     stamp: Stamp,
-    /// Velocity of the inertial sensor's place, base frame.
-    imu_velocity: Vector3,
     velocity_in_odom: Vector3,
-    covariance: Matrix3,
-    specific_force: Vector3,
-    angular_velocity: Vector3,
 }
 
 /// Integrates the motion of one robot.
@@ -147,6 +136,7 @@ pub struct LegOdometry<K> {
     config: LegOdometryConfig,
     odom_from_level: Option<Rotation>,
     before: Option<Before>,
+    inertial: InertialVelocity,
     position: Vector3,
     /// Independent errors of the velocities, added up, m².
     walk: Matrix3,
@@ -162,6 +152,7 @@ impl<K: LegKinematics> LegOdometry<K> {
             config,
             odom_from_level: None,
             before: None,
+            inertial: InertialVelocity::new(config.base_from_imu),
             position: Vector3::zeros(),
             walk: Matrix3::zeros(),
             yaw_variance: 0.0,
@@ -190,24 +181,22 @@ impl<K: LegKinematics> LegOdometry<K> {
             .get_or_insert_with(|| unheaded(&level_from_base));
         let odom_from_base = odom_from_level * level_from_base;
 
-        let (prior, prior_covariance) = self.predicted(stamp, &turning, &odom_from_base);
+        let prediction = self.inertial.predict(imu, &odom_from_base);
         let candidates = Leg::ALL.map(|leg| self.foot_says(leg, input));
         let Verdict {
             velocity,
             covariance,
             slips,
             feet,
-        } = vote(&candidates, &prior, &prior_covariance);
+        } = vote(&candidates, &prediction);
+        let seen = (feet > 0).then_some((&velocity, &covariance));
+        self.inertial.correct(seen, &turning);
 
         let in_odom = odom_from_base * velocity;
         self.advance(stamp, &in_odom, &rotated(&odom_from_base, &covariance));
         self.before = Some(Before {
             stamp,
-            imu_velocity: velocity + turning.cross(&self.config.base_from_imu),
             velocity_in_odom: in_odom,
-            covariance,
-            specific_force: imu.specific_force,
-            angular_velocity: turning,
         });
         let speeds = candidates.map(|c| c.map_or(0.0, |c| (c.velocity - velocity).norm()));
         Ok(LegOdometryEstimate {
@@ -248,38 +237,6 @@ impl<K: LegKinematics> LegOdometry<K> {
         } else {
             Err(LegOdometryError::NotFinite { stamp })
         }
-    }
-
-    /// What the last velocity and the accelerometer say: `dv/dt = f + g - w x v`, at the inertial
-    /// sensor's place.
-    fn predicted(
-        &self,
-        stamp: Stamp,
-        turning: &Vector3,
-        odom_from_base: &Rotation,
-    ) -> (Vector3, Matrix3) {
-        const GRAVITY: f64 = 9.80665;
-        let unknown = (Vector3::zeros(), Matrix3::identity() * UNKNOWN_VARIANCE);
-        let Some(before) = &self.before else {
-            return unknown;
-        };
-        let dt = stamp.secs_since(before.stamp);
-        if dt > LONGEST_GAP_S {
-            return unknown;
-        }
-        let down = odom_from_base.inverse_transform_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
-        let v = before.imu_velocity;
-        let acceleration = before.specific_force + down - before.angular_velocity.cross(&v);
-        let at_imu = v + acceleration * dt;
-        let sigma = self.config.acceleration_sigma * dt;
-        // Errors of an attitude last: they add up over the time that no foot is trusted.
-        let grown = libm::sqrt(before.covariance.trace() / 3.0) + sigma;
-        let covariance = before.covariance
-            + Matrix3::identity() * (grown * grown - before.covariance.trace() / 3.0);
-        (
-            at_imu - turning.cross(&self.config.base_from_imu),
-            covariance,
-        )
     }
 
     /// The base's velocity if this foot stands still.

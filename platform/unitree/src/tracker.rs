@@ -3,10 +3,10 @@
 //! In: what legs and body measured at one moment. Out: which feet stand, where the ground is, how
 //! the body moves.
 
-use hachi_hal::{AttitudeSample, ImuSample, Leg, LegKinematics, LegState, Vector3};
+use hachi_hal::{AttitudeSample, ImuSample, Leg, LegKinematics, LegState, Rotation, Vector3};
 
 use crate::contact::{ContactConfig, ContactDetector, ContactInput, Contacts};
-use crate::footprint::{Footprint, FootprintTracker};
+use crate::footprint::{Footprint, FootprintInput, FootprintTracker};
 use crate::kinematics::LegGeometry;
 use crate::odometry::{
     LegOdometry, LegOdometryConfig, LegOdometryError, LegOdometryEstimate, LegOdometryInput,
@@ -43,6 +43,7 @@ pub struct LegTracker {
     footprint: FootprintTracker,
     odometry: LegOdometry<LegGeometry>,
     ground_in_level: Option<Vector3>,
+    place_in_odom: Option<Vector3>,
 }
 
 impl LegTracker {
@@ -63,6 +64,7 @@ impl LegTracker {
             footprint: FootprintTracker::new(),
             odometry: LegOdometry::new(robot.geometry, odometry),
             ground_in_level: None,
+            place_in_odom: None,
         }
     }
 
@@ -87,21 +89,41 @@ impl LegTracker {
             ground_normal: ground,
             angular_velocity: imu.angular_velocity,
         });
-        let feet = Leg::ALL.map(|leg| self.legs.foot_in_base(leg, &legs.angles[leg.index()]));
-        let footprint =
-            self.footprint
-                .step(&self.legs, &feet, &contacts, &attitude.level_from_base);
-        let ground = footprint.map_or(ground, |f| f.normal_in_base());
-        self.ground_in_level = Some(attitude.level_from_base * ground);
         let motion = self.odometry.step(&LegOdometryInput {
             sample,
             contacts: &contacts,
             ground_normal: ground,
         })?;
+        let feet = Leg::ALL.map(|leg| self.legs.foot_in_base(leg, &legs.angles[leg.index()]));
+        let moved = self.moved(&motion, &attitude.level_from_base);
+        let input = FootprintInput {
+            feet: &feet,
+            contacts: &contacts,
+            moving: &motion.slip.feet,
+            level_from_base: attitude.level_from_base,
+            moved,
+        };
+        let footprint = self.footprint.step(&self.legs, &input);
+        let normal = footprint.map(|f| attitude.level_from_base * f.normal_in_base());
+        self.ground_in_level = normal.or(self.ground_in_level);
         Ok(LegEstimate {
             contacts,
             footprint,
             motion,
         })
+    }
+
+    /// The way since the last moment in the attitude's level frame; `None` at first, and while no
+    /// foot was trusted.
+    fn moved(
+        &mut self,
+        motion: &LegOdometryEstimate,
+        level_from_base: &Rotation,
+    ) -> Option<Vector3> {
+        let pose = &motion.sample.odom_from_base;
+        let place = pose.translation.vector;
+        let before = self.place_in_odom.replace(place)?;
+        let level_from_odom = level_from_base * pose.rotation.inverse();
+        (motion.feet > 0).then(|| level_from_odom * (place - before))
     }
 }

@@ -14,6 +14,17 @@ pub struct Candidate {
     pub covariance: Matrix3,
 }
 
+/// What the inertial sensor says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// The base's velocity, m/s.
+    pub velocity: Vector3,
+    /// Its covariance, (m/s)².
+    pub covariance: Matrix3,
+    /// Whether it may outvote feet.
+    pub is_trusted: bool,
+}
+
 /// What the vote ended in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
@@ -31,11 +42,10 @@ pub struct Verdict {
 /// chi-square with three degrees of freedom.
 const GATE: f64 = 16.27;
 
-/// Votes of the prediction: it breaks ties, and can't outvote two feet.
-const PREDICTION_VOTES: f64 = 1.5;
-/// A prediction less certain than this has no vote, m/s: by then two feet that slip together are
-/// believed rather than it.
-const LEAST_CERTAIN: f64 = 0.25;
+/// Votes of a prediction that is trusted: more than two feet that slip together, fewer than three.
+const PREDICTION_VOTES: f64 = 2.5;
+/// Votes of one that is not: it breaks ties.
+const DOUBTFUL_VOTES: f64 = 0.5;
 
 /// Squared distance of two velocities in units of their covariances.
 fn distance(a: &Vector3, a_covariance: &Matrix3, b: &Vector3, b_covariance: &Matrix3) -> f64 {
@@ -48,19 +58,18 @@ fn distance(a: &Vector3, a_covariance: &Matrix3, b: &Vector3, b_covariance: &Mat
 }
 
 /// Finds the velocity that most agree on.
-pub fn vote(
-    candidates: &[Option<Candidate>; 4],
-    prior: &Vector3,
-    prior_covariance: &Matrix3,
-) -> Verdict {
-    let certain = libm::sqrt(prior_covariance.trace() / 3.0) < LEAST_CERTAIN;
-    let prediction = certain.then_some(Candidate {
-        velocity: *prior,
-        covariance: *prior_covariance,
+pub fn vote(candidates: &[Option<Candidate>; 4], prediction: &Prediction) -> Verdict {
+    let predicted = Some(Candidate {
+        velocity: prediction.velocity,
+        covariance: prediction.covariance,
     });
     let voters: [Option<Candidate>; 5] =
-        core::array::from_fn(|i| *candidates.get(i).unwrap_or(&prediction));
-    let votes = |i: usize| if i == 4 { PREDICTION_VOTES } else { 1.0 };
+        core::array::from_fn(|i| *candidates.get(i).unwrap_or(&predicted));
+    let votes = |i: usize| match (i, prediction.is_trusted) {
+        (4, true) => PREDICTION_VOTES,
+        (4, false) => DOUBTFUL_VOTES,
+        _ => 1.0,
+    };
     let agree = |a: &Candidate, b: &Candidate| {
         distance(&a.velocity, &a.covariance, &b.velocity, &b.covariance) < GATE
     };
@@ -84,19 +93,18 @@ pub fn vote(
         }
     }
     let winner = best.and_then(|(_, _, i)| voters[i]);
-    combined(candidates, winner.as_ref(), prior, prior_covariance)
+    combined(candidates, winner.as_ref(), prediction)
 }
 
 /// The weighted mean of the feet that agree with the winner; the prediction where there are none.
 fn combined(
     candidates: &[Option<Candidate>; 4],
     winner: Option<&Candidate>,
-    prior: &Vector3,
-    prior_covariance: &Matrix3,
+    prediction: &Prediction,
 ) -> Verdict {
     let mut verdict = Verdict {
-        velocity: *prior,
-        covariance: *prior_covariance,
+        velocity: prediction.velocity,
+        covariance: prediction.covariance,
         slips: [false; 4],
         feet: 0,
     };

@@ -14,6 +14,7 @@
 //! | [`sensor`] | which sensors there are, and when their lasers fire |
 //! | [`simulation`], [`lidar`] | packet after packet; as a [`hachi_hal::PacketSource`] |
 //! | [`imu`], [`odometry`] | the other sensors |
+//! | [`legs`] | joints, feet and body of a quadruped that walks the path |
 //! | [`loops`] | when the robot truly comes back to where it has been |
 //! | [`preset`] | ready-made buildings and campuses |
 //! | [`capture`] | pcap and TUM files |
@@ -36,6 +37,7 @@ pub mod floor;
 mod ground;
 mod helios;
 pub mod imu;
+pub mod legs;
 pub mod lidar;
 pub mod loops;
 pub mod material;
@@ -57,6 +59,7 @@ mod vlp16;
 pub use capture::{CaptureError, CaptureWriter, write_pcap, write_tum};
 pub use floor::{Floor, RaisedFloor, Terrain, Wave};
 pub use imu::{GRAVITY, ImuConfig, SimulatedImu};
+pub use legs::{LegDimensions, LegTick, LegsConfig, WalkingLegs};
 pub use lidar::{SimulatedLidar, SimulatedLidarError};
 pub use loops::{Direction, LoopPass, LoopSearch, Revisit, TrueLoops};
 pub use material::{Finish, Material};

@@ -11,6 +11,7 @@ pub(crate) enum Purpose {
     Imu = 3,
     Odometry = 4,
     Strays = 5,
+    Legs = 6,
 }
 
 /// A generator of its own for `purpose` and the `index`-th thing of that purpose.

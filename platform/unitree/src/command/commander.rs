@@ -141,6 +141,18 @@ impl Commander {
         self.reported
     }
 
+    /// Where on the ladder of modes the robot is told to be.
+    pub fn rung(&self) -> Option<Rung> {
+        self.ladder.rung()
+    }
+
+    /// Lets the command in force die at once: zero velocity from now on.
+    pub fn halt(&mut self) {
+        if let Some(command) = &mut self.command {
+            command.time_to_live_ns = 0;
+        }
+    }
+
     /// Form of the check value for this robot.
     pub fn check_form(&self) -> CheckForm {
         self.config.check_form
@@ -163,10 +175,10 @@ impl Commander {
             return Err(CommandRefused::Dead { late_ns });
         }
         let moves = matches!(&command.action, BaseAction::Move(v) if !v.is_zero());
-        let poses = matches!(command.action, BaseAction::Pose(_));
+        let needs_feet = moves || matches!(command.action, BaseAction::Pose(_));
         match self.ladder.rung() {
-            None if moves || poses => return Err(CommandRefused::Unheard),
-            Some(rung) if (moves || poses) && rung < Rung::Standing => {
+            None if needs_feet => return Err(CommandRefused::Unheard),
+            Some(rung) if needs_feet && rung < Rung::Standing => {
                 return Err(CommandRefused::NotStanding(rung));
             }
             _ => {}
