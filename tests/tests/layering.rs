@@ -95,13 +95,13 @@ const LAYERS: &[Layer] = &[
     },
     Layer {
         name: "hachi-place",
-        sees: &["hachi-hal"],
+        sees: &["hachi-hal", "hachi-cloud"],
         tests_see: &["hachi-world"],
         because: "a place is recognised in any cloud: usable by someone who has never heard of this robot",
     },
     Layer {
         name: "hachi-posegraph",
-        sees: &["hachi-hal"],
+        sees: &[],
         tests_see: &[],
         because: "a pose graph has no sensor: usable by someone who has never heard of this robot",
     },

@@ -2,6 +2,7 @@
 //!
 //! Only the shape of arguments is here; what they do is in [`commands`](crate::commands).
 
+pub mod loops;
 pub mod mapping;
 
 use std::num::NonZeroUsize;
@@ -47,6 +48,8 @@ pub enum Command {
     after_help = "Example:\n  hachi eval trajectory --reference truth.tum --estimate trajectory.tum"
 )]
 pub enum Eval {
+    /// Precision and recall of place recognition on keyframe scans.
+    Loops(loops::EvalLoopsArguments),
     /// Align two clouds with GICP.
     Registration(mapping::EvalRegistrationArguments),
     /// Absolute and relative pose error of a trajectory, as evo computes them.

@@ -3,6 +3,7 @@
 pub mod decode;
 pub mod demo;
 pub mod doctor;
+pub mod eval_loops;
 pub mod eval_registration;
 pub mod eval_trajectory;
 pub mod replay;
@@ -19,6 +20,7 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
+        Command::Eval(Eval::Loops(arguments)) => eval_loops::run(&arguments),
         Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),

@@ -1,9 +1,9 @@
-//! The height of the floor: zero, and ramps that rise over it.
+//! The height of the floor: zero, and ramps that rise over it; outdoors, hills.
 //!
 //! The same function gives the scene its ramp surface and the robot its footing, so the footprint
 //! of the truth lies on what the LiDAR sees. It can be differentiated twice.
 
-use crate::smooth::Rise;
+use crate::smooth::{self, Rise};
 
 /// Over how many metres a ramp's slope sets in and ends.
 const BLEND_M: f64 = 0.5;
@@ -47,17 +47,63 @@ impl RaisedFloor {
     }
 }
 
+/// A wave of the ground, as long crested as the terrain is wide.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wave {
+    /// How far it rises and falls, metres.
+    pub amplitude_m: f64,
+    /// From crest to crest, metres.
+    pub length_m: f64,
+    /// Direction in which it runs, radians, x towards y.
+    pub heading_rad: f64,
+    /// Phase at the origin, radians.
+    pub phase_rad: f64,
+}
+
+impl Wave {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        let (sin, cos) = self.heading_rad.sin_cos();
+        let along = (x * cos + y * sin) / self.length_m;
+        self.amplitude_m * (std::f64::consts::TAU * along + self.phase_rad).sin()
+    }
+}
+
+/// Rolling ground: waves that add up, level about the origin.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Terrain {
+    /// The waves that add up to it.
+    pub waves: Vec<Wave>,
+    /// How far around the origin it is level, metres.
+    pub level_m: f64,
+    /// Over how many metres beyond that the waves set in.
+    pub blend_m: f64,
+}
+
+impl Terrain {
+    /// The ground's height at a place, metres.
+    pub fn height(&self, x: f64, y: f64) -> f64 {
+        let share = smooth::step((x.hypot(y) - self.level_m) / self.blend_m.max(1e-9));
+        share * self.waves.iter().map(|wave| wave.height(x, y)).sum::<f64>()
+    }
+}
+
 /// The floor of a scene.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Floor {
     /// Stretches that rise over the level floor; they must not overlap.
     pub raised: Vec<RaisedFloor>,
+    /// What it lies on, where that is not level.
+    pub terrain: Option<Terrain>,
 }
 
 impl Floor {
     /// The floor's height at a place, metres.
     pub fn height(&self, x: f64, y: f64) -> f64 {
-        self.raised.iter().map(|raised| raised.height(x, y)).sum()
+        let raised: f64 = self.raised.iter().map(|raised| raised.height(x, y)).sum();
+        match &self.terrain {
+            Some(terrain) => raised + terrain.height(x, y),
+            None => raised,
+        }
     }
 }
 
@@ -76,11 +122,31 @@ mod tests {
                 level_m: 2.0,
                 height_m: 0.3,
             }],
+            ..Floor::default()
         };
         assert_eq!(floor.height(2.0, 0.9), 0.0);
         assert_eq!(floor.height(3.2, 5.0), 0.0);
         assert!((floor.height(2.5, 5.0) - 0.3).abs() < 1e-12);
         assert!((floor.height(2.0, 2.5) - 0.15).abs() < 1e-12);
         assert!(floor.height(2.0, 9.1).abs() < 1e-12);
+    }
+    #[test]
+    fn ground_is_level_at_the_origin_and_rolls_beyond() {
+        let terrain = Terrain {
+            waves: vec![Wave {
+                amplitude_m: 1.5,
+                length_m: 120.0,
+                heading_rad: 0.0,
+                phase_rad: 0.0,
+            }],
+            level_m: 8.0,
+            blend_m: 30.0,
+        };
+        assert_eq!(terrain.height(0.0, 7.9), 0.0);
+        assert_eq!(terrain.height(-5.0, 5.0), 0.0);
+        // Past the blend: a quarter wave, and a full one, from the origin.
+        assert!((terrain.height(150.0, 3.0) - 1.5).abs() < 1e-9);
+        assert!(terrain.height(120.0, -70.0).abs() < 1e-9);
+        assert!((terrain.height(90.0, 0.0) + 1.5).abs() < 1e-9);
     }
 }

@@ -10,7 +10,8 @@ pub(crate) enum Purpose {
     Packets = 2,
     Imu = 3,
     Odometry = 4,
-    Legs = 5,
+    Strays = 5,
+    Legs = 6,
 }
 
 /// A generator of its own for `purpose` and the `index`-th thing of that purpose.

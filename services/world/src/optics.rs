@@ -36,22 +36,25 @@ pub enum ReturnLabel {
     Ghost,
     /// Something seen in a polished floor: reported below the floor, where nothing is.
     FloorGhost,
+    /// Nothing at all: dust, stray light, another sensor's pulse.
+    Stray,
 }
 
 impl ReturnLabel {
     /// All but [`ReturnLabel::None`].
-    pub const RETURNS: [Self; 6] = [
+    pub const RETURNS: [Self; 7] = [
         Self::Direct,
         Self::Floor,
         Self::GlassSurface,
         Self::ThroughGlass,
         Self::Ghost,
         Self::FloorGhost,
+        Self::Stray,
     ];
 
     /// Whether there is nothing where this return is reported.
     pub const fn is_ghost(self) -> bool {
-        matches!(self, Self::Ghost | Self::FloorGhost)
+        matches!(self, Self::Ghost | Self::FloorGhost | Self::Stray)
     }
 }
 

@@ -14,6 +14,7 @@ use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Cuboid, Triangle};
 
 use crate::floor::Floor;
+use crate::ground::Ground;
 use crate::material::Material;
 use crate::optics::brightness;
 
@@ -48,6 +49,10 @@ pub(crate) enum Shape {
         radius: f32,
         height: f32,
     },
+    Ball {
+        centre: Vector,
+        radius: f32,
+    },
     Triangle(Triangle),
 }
 
@@ -67,6 +72,10 @@ impl Shape {
                 *base - Vector::new(*radius, *radius, 0.0),
                 *base + Vector::new(*radius, *radius, *height),
             ),
+            Self::Ball { centre, radius } => {
+                let reach = Vector::new(*radius, *radius, *radius);
+                Aabb::new(*centre - reach, *centre + reach)
+            }
             Self::Triangle(triangle) => triangle.local_aabb(),
         }
     }
@@ -83,6 +92,7 @@ impl Shape {
                 radius,
                 height,
             } => cylinder_hit(*base, *radius, *height, ray).map(|(distance, _)| distance),
+            Self::Ball { centre, radius } => ball_hit(*centre, *radius, ray),
             Self::Triangle(triangle) => triangle.cast_local_ray(ray, within, true),
         }
     }
@@ -103,10 +113,26 @@ impl Shape {
                 return cylinder_hit(*base, *radius, *height, ray)
                     .map_or(Vector::ZERO, |(_, normal)| normal);
             }
+            Self::Ball { centre, radius } => {
+                return ball_hit(*centre, *radius, ray).map_or(Vector::ZERO, |distance| {
+                    (ray.point_at(distance) - *centre) / *radius
+                });
+            }
             Self::Triangle(triangle) => triangle.cast_local_ray_and_get_normal(ray, within, true),
         };
         hit.map_or(Vector::ZERO, |hit| hit.normal)
     }
+}
+
+/// Distance at which a ray from outside enters a ball.
+fn ball_hit(centre: Vector, radius: f32, ray: &Ray) -> Option<f32> {
+    let to_centre = centre - ray.origin;
+    let along = to_centre.dot(ray.dir);
+    // From the foot of the perpendicular, not from the squares of long distances.
+    let across = to_centre - ray.dir * along;
+    let chord = radius * radius - across.dot(across);
+    let distance = along - chord.max(0.0).sqrt();
+    (chord >= 0.0 && distance >= 0.0).then_some(distance)
 }
 
 /// Distance and normal where a ray from outside enters an upright cylinder.
@@ -163,12 +189,18 @@ pub struct Scene {
     primitives: Vec<Primitive>,
     objects: Vec<Object>,
     tree: Bvh,
+    ground: Option<Ground>,
     floor: Floor,
     brightest: f32,
 }
 
 impl Scene {
-    pub(crate) fn new(primitives: Vec<Primitive>, objects: Vec<Object>, floor: Floor) -> Self {
+    pub(crate) fn new(
+        primitives: Vec<Primitive>,
+        objects: Vec<Object>,
+        ground: Option<Ground>,
+        floor: Floor,
+    ) -> Self {
         let bounds: Vec<Aabb> = primitives
             .iter()
             .map(|primitive| primitive.shape.bounds())
@@ -181,6 +213,7 @@ impl Scene {
             tree: Bvh::from_leaves(BvhBuildStrategy::Ploc, &bounds),
             primitives,
             objects,
+            ground,
             floor,
         }
     }
@@ -192,13 +225,20 @@ impl Scene {
 
     /// The first hit within `within` metres of a ray with a unit direction, passing by `ignore`.
     pub(crate) fn cast(&self, ray: &Ray, within: f32, ignore: Option<ObjectId>) -> Option<Hit> {
-        let (index, distance) = self.tree.cast_ray(ray, within, |index, best| {
+        let ground = (self.ground.as_ref())
+            .and_then(|ground| ground.cast(ray, within))
+            .filter(|hit| Some(hit.object) != ignore);
+        let within = ground.map_or(within, |hit| hit.distance);
+        let nearest = self.tree.cast_ray(ray, within, |index, best| {
             let primitive = &self.primitives[index as usize];
             if Some(primitive.object) == ignore {
                 return None;
             }
             primitive.shape.distance(ray, best)
-        })?;
+        });
+        let Some((index, distance)) = nearest else {
+            return ground;
+        };
         let primitive = &self.primitives[index as usize];
         Some(Hit {
             distance,
@@ -226,7 +266,7 @@ impl Scene {
         self.objects.len()
     }
 
-    /// How many boxes, cylinders and triangles the objects are made of.
+    /// How many boxes, cylinders, balls and triangles the objects are made of.
     pub fn primitive_count(&self) -> usize {
         self.primitives.len()
     }
@@ -289,6 +329,38 @@ mod tests {
         assert!((cap - 2.0).abs() < 1e-5, "{cap}");
         assert_eq!(distance(&scene, [0.0, 0.26, 0.0], [1.0, 0.0, 0.0]), None);
         assert_eq!(distance(&scene, [0.0, 0.0, 1.01], [1.0, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_ball_is_hit_where_it_bulges() {
+        let mut builder = SceneBuilder::new();
+        builder.ball([5.0, 0.0, 0.0], 0.5, Material::CONCRETE);
+        let scene = builder.build();
+        let side = distance(&scene, [0.0, 0.3, 0.0], [1.0, 0.0, 0.0]).unwrap();
+        assert!((side - 4.6).abs() < 1e-5, "{side}"); // 3-4-5 triangle: 5 - 0.4
+        assert_eq!(distance(&scene, [0.0, 0.51, 0.0], [1.0, 0.0, 0.0]), None);
+        assert_eq!(distance(&scene, [9.0, 0.0, 0.0], [1.0, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_beam_reaches_from_end_to_end_along_its_slope() {
+        let mut builder = SceneBuilder::new();
+        builder.beam(
+            [0.0, 1.0, 0.0],
+            [4.0, 1.0, 1.0],
+            0.4,
+            0.3,
+            Material::CONCRETE,
+        );
+        let scene = builder.build();
+        // Its upper edge rises one in four, its ends are cut square to the slope.
+        for x in [0.1, 1.0, 2.0, 3.5] {
+            let down = distance(&scene, [x, 1.1, 3.0], [0.0, 0.0, -1.0]).unwrap();
+            assert!((3.0 - down - x / 4.0).abs() < 1e-5, "at {x}: {down}");
+        }
+        assert_eq!(distance(&scene, [1.0, 1.21, 3.0], [0.0, 0.0, -1.0]), None);
+        let side = distance(&scene, [2.0, 0.0, 0.4], [0.0, 1.0, 0.0]).unwrap();
+        assert!((side - 0.8).abs() < 1e-5, "{side}");
     }
 
     #[test]

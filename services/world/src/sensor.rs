@@ -13,7 +13,7 @@ use rand::RngExt;
 use crate::calendar::Utc;
 use crate::noise::{Purpose, generator, normal_pair};
 use crate::optics::{Echoes, Wanted, beam, trace};
-use crate::returns::{Measurement, Report, ReturnTruth, dual_of, strongest_of};
+use crate::returns::{Measurement, Report, ReturnTruth, Strays, dual_of, strongest_of};
 use crate::scene::Scene;
 use crate::simulation::SimulationConfig;
 use crate::{helios, vlp16};
@@ -42,7 +42,7 @@ pub(crate) struct Firing {
 /// The head turns 10 times a second.
 const TURN_NS: i64 = 100_000_000;
 /// Nor from farther: VLP-16 data sheet, 100 m, and the Helios' 16-bit distances reach 163 m.
-const MAX_RANGE_M: f32 = 100.0;
+pub(crate) const MAX_RANGE_M: f32 = 100.0;
 /// Half the distance between the two halves of a beam at its divergence of 3 mrad (VLP-16
 /// manual), radians: at edges they see two things.
 const HALF_BEAM_RAD: f64 = 0.000_75;
@@ -191,6 +191,7 @@ pub(crate) fn make_packet(config: &SimulationConfig, index: u64, packet: &mut Da
     let sensor = config.sensor;
     let begins_ns = index as i64 * sensor.packet_ns();
     let mut random = generator(config.seed, Purpose::Packets, index);
+    let mut strays = Strays::new(config.seed, config.noise.stray_share, index);
     let mut reports = [Report::default(); 384];
     packet.truth = [ReturnTruth::default(); 384];
     let pose_at = |offset_ns: i64| {
@@ -225,10 +226,14 @@ pub(crate) fn make_packet(config: &SimulationConfig, index: u64, packet: &mut Da
             match strongest {
                 None => {
                     let echo = strongest_of(echoes.as_slice(), measured.threshold, None);
-                    (reports[last], packet.truth[last]) = measured.report(echo);
+                    (reports[last], packet.truth[last]) =
+                        measured.report(strays.instead_of(echo).or(echo));
                 }
                 Some(strongest) => {
                     let (late, strong) = dual_of(echoes.as_slice(), measured.threshold);
+                    // A stray return hides both: the pulse's other echo is weaker or too near.
+                    let stray = strays.instead_of(strong);
+                    let (late, strong) = (stray.or(late), stray.or(strong));
                     (reports[last], packet.truth[last]) = measured.report(late);
                     (reports[strongest], packet.truth[strongest]) = measured.report(strong);
                 }

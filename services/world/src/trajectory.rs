@@ -61,6 +61,27 @@ impl Gait {
         }
     }
 
+    /// A quadruped that trots at `speed` m/s and rounds its corners the wider the faster it is, at
+    /// 1 rad/s: a corner cut by `c` metres has a curvature of 1.75 / c at most.
+    pub fn trotting(speed: f64) -> Self {
+        Self {
+            speed,
+            corner_cut_m: 1.75 * speed,
+            ..Self::quadruped()
+        }
+    }
+
+    /// A robot on wheels at `speed` m/s, at most 3 m/s² in corners: it hardly bobs.
+    pub fn wheeled(speed: f64) -> Self {
+        Self {
+            speed,
+            ramp_s: 2.0,
+            corner_cut_m: 1.75 * speed * speed / 3.0,
+            body: BodyMotion::rolling(),
+            ..Self::quadruped()
+        }
+    }
+
     /// Somebody in a hurry who carries the sensor.
     pub fn hand_held() -> Self {
         Self {
@@ -325,6 +346,7 @@ mod tests {
                 level_m: 1.0,
                 height_m: 0.3,
             }],
+            ..Floor::default()
         };
         TrajectoryBuilder::new([0.0, 0.0], 0.0, gait)
             .stand(1.0)

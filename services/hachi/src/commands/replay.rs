@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use hachi_slam::MemoryStore;
 use hachi_trajectory::plot::Plot;
 
-use crate::cli::mapping::ReplayArguments;
+use crate::cli::mapping::{ReplayArguments, StageArgument};
 use crate::config::MappingConfig;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
@@ -30,10 +31,13 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let results = Results::create_for(&arguments.input, &arguments.out)?;
     let cancelled = Cancelled::on_interrupt()?;
     let bar = progress::bar(source.scan_count(), "scans");
-    let mut mapping = Mapping::new(config)?;
+    let mut mapping = Mapping::new(config, results.folder())?;
+    if arguments.stage == StageArgument::Slam {
+        mapping = mapping.with_slam(Box::new(MemoryStore::default()));
+    }
 
     let pool = thread_pool(arguments.threads.map(|n| n.get()))?;
-    let (ended, mut report) = pool.install(|| {
+    let (ended, finished, mut report) = pool.install(|| {
         let ended = run_mapping(
             &mut mapping,
             &mut *source,
@@ -42,10 +46,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
             &bar,
             |_, _, _| (),
         );
-        let report = mapping.report();
-        (ended, report)
+        let finished = mapping.finish();
+        (ended, finished, mapping.report())
     });
     bar.finish_and_clear();
+    finished?;
 
     for (reason, count) in source.dropped() {
         report.drop_for(&reason, count);
@@ -82,8 +87,15 @@ pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Failure>
 /// The first that can't be written.
 fn write_all(results: &Results, mapping: &Mapping, report: &mut Report) -> Result<(), Failure> {
     let trajectory = mapping.trajectory();
+    let (how, loops) = match mapping.slam() {
+        Some(slam) => (
+            format!("{} loops closed", report.loops.accepted),
+            slam.loop_lines(),
+        ),
+        None => ("odometry alone".to_owned(), Vec::new()),
+    };
     let subtitle = format!(
-        "{} scans, {:.1} m, odometry alone",
+        "{} scans, {:.1} m, {how}",
         report.scans, report.path_length_m
     );
     let picture = Plot {
@@ -92,13 +104,14 @@ fn write_all(results: &Results, mapping: &Mapping, report: &mut Report) -> Resul
         estimate: trajectory,
         reference: None,
         errors_m: None,
+        links: &loops,
     };
     let written = first_failure([
         results.trajectory("trajectory.tum", trajectory),
-        results.trajectory("odometry.tum", trajectory),
+        results.trajectory("odometry.tum", &mapping.odometry()),
         results.picture(&picture),
         results.map(mapping.map(), trajectory),
-        results.no_loops(),
+        results.loops(mapping.slam()),
     ]);
     if written.is_err() {
         report.state = RunState::OutputFailed;
@@ -138,7 +151,7 @@ fn summary(report: &Report, mapping: &Mapping, results: &Results) -> String {
     format!(
         "{} scans in {:.1} s, path {:.2} m\n\
          {:.1} ms a scan in the mean, {:.1} ms at the 99th percentile, {} threads\n\
-         condition OK {}, DEGRADED {}, LOST {}\n\
+         condition OK {}, DEGRADED {}, LOST {}; {} of {} loop candidates closed\n\
          map of {} points, trajectory and report in {}",
         report.scans,
         report.duration_s,
@@ -149,6 +162,8 @@ fn summary(report: &Report, mapping: &Mapping, results: &Results) -> String {
         conditions.ok,
         conditions.degraded,
         conditions.lost,
+        report.loops.accepted,
+        report.loops.candidates,
         mapping.map().len(),
         results.path("").display(),
     )
