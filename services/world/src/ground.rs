@@ -1,8 +1,9 @@
 //! Rolling ground: heights on a square grid, two triangles to a cell.
 //!
 //! In: the terrain's height function, the rectangle to cover. Out: where a ray meets it first.
-//! The heights within a block of cells are bounded, so a ray steps over blocks that it passes
-//! above, and looks at single cells only where it may meet the ground. Between the grid's
+//! No ground is steeper than the steepest triangle, nor does it bend faster than where it bends
+//! most: so a ray leaps as far as it can't have met the ground, and looks at single cells only
+//! where it comes near. Between the grid's
 //! points the surface departs from the height function by an eighth of the curvature along
 //! either axis: 2 mm on the ready-made terrains.
 
@@ -14,8 +15,17 @@ use crate::scene::{Hit, ObjectId};
 
 /// Edge of a cell, metres.
 const CELL_M: f32 = 1.0;
-/// Cells along the edge of a block.
-const BLOCK: usize = 16;
+/// So many firings of a laser are led over the ground together.
+const ALIKE: usize = 8;
+/// Shorter leaps than this are not worth their while: single cells are looked at instead.
+const LEAST_LEAP_M: f32 = 0.5;
+/// So many of them, before the next leap is tried.
+const CELLS_A_TIME: usize = 4;
+/// The slopes of two triangles differ by no more than the ground bends over the way between them
+/// and this much beyond, metres: within a cell, a slope is that of some place in it.
+const BESIDE_M: f32 = 3.0;
+/// A leap ends so far before it might meet the ground, against rounding, metres.
+const SAFETY_M: f32 = 1e-3;
 
 /// What the cells of a rectangle are covered with.
 #[derive(Debug, Clone, Copy)]
@@ -29,30 +39,38 @@ pub(crate) struct Cover {
 pub(crate) struct Ground {
     /// The place of the first grid point.
     low: [f32; 2],
-    /// Cells along x and y, whole blocks.
+    /// Cells along x and y.
     cells: [usize; 2],
     /// At the grid points, row by row: `cells[0] + 1` to a row.
     heights: Vec<f32>,
-    /// The greatest height of each block, row by row.
-    tops: Vec<f32>,
     /// The greatest height of all.
     top: f32,
+    /// The steepest slope of all.
+    steepest: f32,
+    /// How much the slope changes at most, for each metre.
+    bend: f32,
     /// What each cell is covered with, row by row.
     objects: Vec<ObjectId>,
 }
 
-/// The stretch of a ray over one cell or block, and the way to the next.
+/// A place of a ray over the ground.
+struct Over {
+    clearance: f32,
+    /// How much of it the ray loses here, for each metre.
+    closing: f32,
+}
+
+/// A walk along a ray from cell to cell.
 struct Walk {
-    at: [isize; 2],
-    step: [isize; 2],
+    at: [i32; 2],
+    step: [i32; 2],
     /// Where along the ray the next line of either axis is crossed, and how far apart these are.
     next: [f32; 2],
     delta: [f32; 2],
 }
 
 impl Walk {
-    /// From a point of the grid, both in units of `edge`.
-    fn new(from: [f32; 2], dir: [f32; 2], begin: f32, edge: f32, low: [f32; 2]) -> Self {
+    fn new(from: [f32; 2], dir: [f32; 2], begin: f32, low: [f32; 2]) -> Self {
         let mut walk = Self {
             at: [0; 2],
             step: [0; 2],
@@ -60,14 +78,14 @@ impl Walk {
             delta: [f32::INFINITY; 2],
         };
         for axis in 0..2 {
-            let place = (from[axis] + dir[axis] * begin - low[axis]) / edge;
-            walk.at[axis] = place.floor() as isize;
+            let place = (from[axis] + dir[axis] * begin - low[axis]) / CELL_M;
+            walk.at[axis] = place.floor() as i32;
             if dir[axis] != 0.0 {
                 walk.step[axis] = if dir[axis] > 0.0 { 1 } else { -1 };
-                let ahead = walk.at[axis] + isize::from(dir[axis] > 0.0);
-                let line = ahead as f32 * edge + low[axis];
+                let ahead = walk.at[axis] + i32::from(dir[axis] > 0.0);
+                let line = ahead as f32 * CELL_M + low[axis];
                 walk.next[axis] = ((line - from[axis]) / dir[axis]).max(begin);
-                walk.delta[axis] = (edge / dir[axis]).abs();
+                walk.delta[axis] = (CELL_M / dir[axis]).abs();
             }
         }
         walk
@@ -84,14 +102,41 @@ impl Walk {
     }
 }
 
+/// How far a ray moves on the level for each metre.
+fn level(ray: &Ray) -> f32 {
+    (ray.dir.x * ray.dir.x + ray.dir.y * ray.dir.y).sqrt()
+}
+
+/// The steepest slope between neighbouring grid points, and the most that slopes change a metre.
+fn extremes(heights: &[f32], cells: [usize; 2]) -> (f32, f32) {
+    let row = cells[0] + 1;
+    let (mut steepest, mut bend) = (0.0f32, 0.0f32);
+    for j in 0..cells[1] {
+        for at in j * row..j * row + cells[0] {
+            let slope = |a: usize, b: usize| (heights[b] - heights[a]) / CELL_M;
+            let (right, up) = (slope(at, at + 1), slope(at, at + row));
+            let (far_right, far_up) = (slope(at + row, at + row + 1), slope(at + 1, at + row + 1));
+            steepest = steepest.max(right.hypot(far_up)).max(far_right.hypot(up));
+            let twist = (far_right - right) / CELL_M;
+            // The cell before this one along either axis, if there is one.
+            let along_x = if at > j * row {
+                right - slope(at - 1, at)
+            } else {
+                0.0
+            };
+            let along_y = if j > 0 { up - slope(at - row, at) } else { 0.0 };
+            let square = along_x * along_x + along_y * along_y + 2.0 * twist * twist;
+            bend = bend.max(square.sqrt() / CELL_M);
+        }
+    }
+    (steepest, bend)
+}
+
 impl Ground {
     /// The terrain over a rectangle. The first cover is everywhere where no later one is.
     pub fn new(terrain: &Terrain, low: [f64; 2], high: [f64; 2], covers: &[Cover]) -> Self {
         let edge = f64::from(CELL_M);
-        let cells = [0, 1].map(|axis| {
-            let cells = ((high[axis] - low[axis]) / edge).ceil().max(1.0) as usize;
-            cells.div_ceil(BLOCK) * BLOCK
-        });
+        let cells = [0, 1].map(|axis| ((high[axis] - low[axis]) / edge).ceil().max(1.0) as usize);
         let place = |i: usize, axis: usize| low[axis] + edge * i as f64;
         let mut heights = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
         for j in 0..=cells[1] {
@@ -110,34 +155,96 @@ impl Ground {
                 objects.push(cover.map_or(0, |cover| cover.object));
             }
         }
-        let mut tops = Vec::with_capacity(cells[0] * cells[1] / (BLOCK * BLOCK));
-        for block_j in 0..cells[1] / BLOCK {
-            for block_i in 0..cells[0] / BLOCK {
-                let mut top = f32::MIN;
-                for j in block_j * BLOCK..=(block_j + 1) * BLOCK {
-                    for i in block_i * BLOCK..=(block_i + 1) * BLOCK {
-                        top = top.max(heights[j * (cells[0] + 1) + i]);
-                    }
-                }
-                tops.push(top);
-            }
-        }
+        let (steepest, bend) = extremes(&heights, cells);
         Self {
             low: low.map(|x| x as f32),
             cells,
+            top: heights.iter().copied().fold(f32::MIN, f32::max),
             heights,
-            top: tops.iter().copied().fold(f32::MIN, f32::max),
-            tops,
+            steepest,
+            bend,
             objects,
         }
     }
 
     /// Where a ray from above the ground meets it first.
     pub fn cast(&self, ray: &Ray, within: f32) -> Option<Hit> {
+        self.cast_from(ray, 0.0, within)
+    }
+
+    /// As [`cast`](Self::cast) for each of the rays. Every `stride`-th ray is about the same, but
+    /// for some thousandths of a turn: the same laser, fired again.
+    pub fn cast_alike(&self, rays: &[Ray], stride: usize, within: f32, hits: &mut [Option<Hit>]) {
+        for first in (0..rays.len()).step_by(stride * ALIKE) {
+            let end = rays.len().min(first + stride * ALIKE);
+            for laser in first..end.min(first + stride) {
+                let alike = (laser..end).step_by(stride);
+                let free = self.free(alike.clone().map(|ray| &rays[ray]), within);
+                if free < within {
+                    for ray in alike {
+                        let begin = free / level(&rays[ray]);
+                        hits[ray] = self.cast_from(&rays[ray], begin, within);
+                    }
+                }
+            }
+        }
+    }
+
+    /// How far on the level none of the rays can have met the ground: they lie over one ray that
+    /// starts from the lowest of their places and rises like the least of them, or beside it by
+    /// no more than they spread.
+    fn free<'a>(&self, mut rays: impl Iterator<Item = &'a Ray>, within: f32) -> f32 {
+        let Some(first) = rays.next() else {
+            return 0.0;
+        };
+        let mut lowest = Ray::new(first.origin, first.dir / level(first));
+        let (mut spread, mut apart) = (0.0f32, 0.0f32);
+        for ray in rays {
+            let dir = ray.dir / level(ray);
+            spread = spread.max((dir - lowest.dir).truncate().length());
+            apart = apart.max((ray.origin - lowest.origin).truncate().length());
+            lowest.origin.z = lowest.origin.z.min(ray.origin.z);
+            lowest.dir.z = lowest.dir.z.min(dir.z);
+        }
+        // The ground comes nearer by its slope, ahead and to the sides.
+        let closing = self.steepest * (1.0 + spread) - lowest.dir.z;
+        if closing.is_nan() || !self.covers(&lowest, 0.0) {
+            return 0.0;
+        }
+        let mut at = 0.0;
+        loop {
+            let beside = self.steepest * (apart + spread * at);
+            let over = self.over(&lowest, at);
+            let clearance = over.clearance - beside - SAFETY_M;
+            if clearance > 0.0 && closing <= 0.0 {
+                return within;
+            }
+            let leap = self.leap(clearance, over.closing + self.steepest * spread, closing);
+            if leap >= within - at {
+                return within;
+            }
+            // Beyond the rectangle nothing is known of the ground.
+            if leap < LEAST_LEAP_M || !self.covers(&lowest, at + leap) {
+                return at;
+            }
+            at += leap;
+        }
+    }
+
+    /// Whether a place of a ray is over the rectangle.
+    fn covers(&self, ray: &Ray, at: f32) -> bool {
+        let point = ray.point_at(at);
+        [point.x, point.y].into_iter().enumerate().all(|(a, x)| {
+            let within = x - self.low[a];
+            within >= 0.0 && within < self.cells[a] as f32 * CELL_M
+        })
+    }
+
+    fn cast_from(&self, ray: &Ray, free: f32, within: f32) -> Option<Hit> {
         let from = [ray.origin.x, ray.origin.y];
         let dir = [ray.dir.x, ray.dir.y];
         // Only where the ray is over the rectangle and not higher than all of the ground.
-        let (mut begin, mut end) = (0.0f32, within);
+        let (mut begin, mut end) = (free, within);
         for axis in 0..2 {
             let high = self.low[axis] + self.cells[axis] as f32 * CELL_M;
             if dir[axis] == 0.0 {
@@ -162,69 +269,95 @@ impl Ground {
         if begin.is_nan() || begin >= end {
             return None;
         }
-        let edge = BLOCK as f32 * CELL_M;
-        let blocks = self.cells.map(|cells| (cells / BLOCK) as isize);
-        let mut walk = Walk::new(from, dir, begin, edge, self.low);
-        let mut enters = begin;
-        while enters < end {
-            let leaves = walk.leaves().min(end);
-            if (0..2).all(|axis| (0..blocks[axis]).contains(&walk.at[axis])) {
-                let top = self.tops[(walk.at[1] * blocks[0] + walk.at[0]) as usize];
-                let lowest =
-                    ray.origin.z + ray.dir.z * if ray.dir.z < 0.0 { leaves } else { enters };
-                if lowest <= top
-                    && let Some(hit) = self.within_block(ray, enters, leaves, walk.at)
-                {
-                    return Some(hit);
+        // How fast the ground can come nearer at most.
+        let closing = self.steepest * level(ray) - ray.dir.z;
+        if closing <= 0.0 {
+            return None;
+        }
+        let mut at = begin;
+        loop {
+            loop {
+                let over = self.over(ray, at);
+                let leap = self.leap(over.clearance - SAFETY_M, over.closing, closing);
+                if leap < LEAST_LEAP_M {
+                    break;
+                }
+                at += leap;
+                if at >= end {
+                    return None;
                 }
             }
-            enters = leaves;
-            walk.advance();
+            let mut walk = Walk::new(from, dir, at, self.low);
+            for _ in 0..CELLS_A_TIME {
+                let leaves = walk.leaves().min(end);
+                if let Some(hit) = self.within_cell(ray, at, leaves, walk.at) {
+                    return Some(hit);
+                }
+                at = leaves;
+                if at >= end {
+                    return None;
+                }
+                walk.advance();
+            }
         }
-        None
     }
 
-    fn within_block(&self, ray: &Ray, begin: f32, end: f32, block: [isize; 2]) -> Option<Hit> {
-        let from = [ray.origin.x, ray.origin.y];
-        let dir = [ray.dir.x, ray.dir.y];
-        let mut walk = Walk::new(from, dir, begin, CELL_M, self.low);
-        // Rounding may put the first cell beside the block: it belongs to the block's edge.
-        let first = block.map(|b| b * BLOCK as isize);
-        for (axis, least) in first.into_iter().enumerate() {
-            let clamped = walk.at[axis].clamp(least, least + BLOCK as isize - 1);
-            if clamped != walk.at[axis] && walk.step[axis] == clamped - walk.at[axis] {
-                walk.next[axis] += walk.delta[axis];
-            }
-            walk.at[axis] = clamped;
+    /// How far a ray may go without meeting the ground: it loses clearance `now` by so much a metre
+    /// (or gains it), and never by more than `most`.
+    #[inline]
+    fn leap(&self, clearance: f32, now: f32, most: f32) -> f32 {
+        if clearance <= 0.0 {
+            return 0.0;
         }
-        let mut enters = begin;
-        loop {
-            let leaves = walk.leaves().min(end);
-            if let Some(hit) = self.within_cell(ray, enters, leaves, walk.at) {
-                return Some(hit);
-            }
-            if leaves >= end {
-                return None;
-            }
-            enters = leaves;
-            walk.advance();
-            if (0..2).any(|a| walk.at[a] < first[a] || walk.at[a] >= first[a] + BLOCK as isize) {
-                return None;
-            }
+        // Where `clearance - now * t - bend * t * t / 2` is zero.
+        let now = now + self.bend * BESIDE_M;
+        let bending = 2.0 * clearance / (now + (now * now + 2.0 * self.bend * clearance).sqrt());
+        bending.max(clearance / most)
+    }
+
+    /// How far over the ground a ray is; over what lies beyond the rectangle, not at all.
+    #[inline]
+    fn over(&self, ray: &Ray, at: f32) -> Over {
+        let point = ray.point_at(at);
+        let x = (point.x - self.low[0]) / CELL_M;
+        let y = (point.y - self.low[1]) / CELL_M;
+        let i = (x as i32).clamp(0, self.cells[0] as i32 - 1);
+        let j = (y as i32).clamp(0, self.cells[1] as i32 - 1);
+        let (u, v) = (x - i as f32, y - j as f32);
+        let Some([h00, h10, h01, h11]) = self.corners(i as usize, j as usize) else {
+            return Over {
+                clearance: 0.0,
+                closing: 0.0,
+            };
+        };
+        let slope = if u >= v {
+            [h10 - h00, h11 - h10]
+        } else {
+            [h11 - h01, h01 - h00]
+        };
+        Over {
+            clearance: point.z - (h00 + slope[0] * u + slope[1] * v),
+            closing: (slope[0] * ray.dir.x + slope[1] * ray.dir.y) / CELL_M - ray.dir.z,
         }
+    }
+
+    /// The heights at a cell's corners.
+    #[inline]
+    fn corners(&self, i: usize, j: usize) -> Option<[f32; 4]> {
+        let row = self.cells[0] + 1;
+        let corner = j * row + i;
+        let near = self.heights.get(corner..corner + 2)?;
+        let far = self.heights.get(corner + row..corner + row + 2)?;
+        Some([near[0], near[1], far[0], far[1]])
     }
 
     /// A cell is cut along its diagonal; over each half the ray's clearance is a linear function
     /// of the way, so where it changes sign the ray meets the ground: no gap between triangles.
-    fn within_cell(&self, ray: &Ray, enters: f32, leaves: f32, at: [isize; 2]) -> Option<Hit> {
-        let [i, j] = at.map(|a| a as usize);
-        let row = self.cells[0] + 1;
-        let corner = j * row + i;
-        let (near, far) = (
-            self.heights.get(corner..corner + 2)?,
-            self.heights.get(corner + row..corner + row + 2)?,
-        );
-        let [h00, h10, h01, h11] = [near[0], near[1], far[0], far[1]];
+    fn within_cell(&self, ray: &Ray, enters: f32, leaves: f32, at: [i32; 2]) -> Option<Hit> {
+        // Rounding may put an end of the ray beside the rectangle.
+        let i = at[0].clamp(0, self.cells[0] as i32 - 1) as usize;
+        let j = at[1].clamp(0, self.cells[1] as i32 - 1) as usize;
+        let [h00, h10, h01, h11] = self.corners(i, j)?;
         let high = h00.max(h10).max(h01).max(h11);
         let z = |t: f32| ray.origin.z + ray.dir.z * t;
         if z(enters).min(z(leaves)) > high {
@@ -250,19 +383,19 @@ impl Ground {
             } else {
                 [h11 - h01, h01 - h00]
             };
-            let clearance =
-                |t: f32| z(t) - (h00 + slope[0] * (x + dx * t) + slope[1] * (y + dy * t));
-            let (before, after) = (clearance(begin), clearance(end));
-            if after <= 0.0 && begin < end {
+            // The clearance at the start of the ray, and how it changes.
+            let start = ray.origin.z - (h00 + slope[0] * x + slope[1] * y);
+            let change = ray.dir.z - (slope[0] * dx + slope[1] * dy);
+            if start + change * end <= 0.0 && begin < end {
                 // Below from the first: rounding at an edge that belongs to both.
-                let share = if before <= 0.0 {
-                    0.0
+                let distance = if change < 0.0 {
+                    (-start / change).clamp(begin, end)
                 } else {
-                    before / (before - after)
+                    begin
                 };
                 let [sx, sy] = slope.map(|s| s / CELL_M);
                 return Some(Hit {
-                    distance: begin + share * (end - begin),
+                    distance,
                     normal: Vector::new(-sx, -sy, 1.0) / (1.0 + sx * sx + sy * sy).sqrt(),
                     object: self.objects[j * self.cells[0] + i],
                 });
@@ -278,14 +411,14 @@ mod tests {
     use crate::floor::Wave;
 
     fn rolling() -> Terrain {
-        let wave = |amplitude_m, length_m, heading_rad: f64| Wave {
+        let wave = |amplitude_m, length_m, along: [f64; 2]| Wave {
             amplitude_m,
             length_m,
-            heading_rad,
+            along,
             phase_rad: 1.0,
         };
         Terrain {
-            waves: vec![wave(1.5, 120.0, 0.3), wave(0.5, 70.0, 1.9)],
+            waves: vec![wave(1.5, 120.0, [0.96, 0.28]), wave(0.5, 70.0, [-0.6, 0.8])],
             level_m: 8.0,
             blend_m: 30.0,
         }

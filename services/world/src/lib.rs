@@ -29,10 +29,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod aim;
 mod building;
 mod calendar;
 mod campus;
 pub mod capture;
+mod fan;
 pub mod floor;
 mod ground;
 mod helios;

@@ -36,7 +36,7 @@ const START_M: f64 = 20.0;
 /// How far ground reaches beyond the last street, metres.
 const BEYOND_M: f64 = 40.0;
 const ASPHALT: Material = Material {
-    incidence_exponent: 0.6,
+    incidence_exponent: 0.5,
     ..Material::rough(0.17)
 };
 const GRASS: Material = Material {
@@ -212,10 +212,11 @@ fn grid_scene(
 fn terrain(random: &mut ChaCha8Rng) -> Terrain {
     let waves = [(0.035, 150.0), (0.03, 115.0), (0.02, 85.0)].map(|(slope, length)| {
         let length_m = length * random.random_range(0.9..1.2);
+        let (sin, cos) = random.random_range(0.0..std::f64::consts::PI).sin_cos();
         Wave {
             amplitude_m: slope * length_m / std::f64::consts::TAU,
             length_m,
-            heading_rad: random.random_range(0.0..std::f64::consts::PI),
+            along: [cos, sin],
             phase_rad: random.random_range(0.0..std::f64::consts::TAU),
         }
     });
