@@ -87,6 +87,7 @@ pub fn ramps(degrees: f64) -> Floor {
             // The slope sets in and ends over half a metre each.
             height_m: (ramp_m - 0.5) * degrees.to_radians().tan(),
         }],
+        terrain: None,
     }
 }
 
