@@ -1,6 +1,10 @@
 //! Legs of a simulated Go1 and B1, followed by the real code: where the ground is, how far they
 //! walked, which feet slip, against the simulation's truth.
 
+#![allow(
+    clippy::print_stdout,
+    reason = "the figures of BENCHMARKS.md, shown with --nocapture"
+)]
 mod walk;
 
 use hachi_hal::{Pose, Vector3};
