@@ -3,6 +3,7 @@
 //! Only the shape of arguments is here; what they do is in [`commands`](crate::commands).
 
 pub mod loops;
+pub mod map;
 pub mod mapping;
 
 use std::num::NonZeroUsize;
@@ -38,6 +39,9 @@ pub enum Command {
     /// Measure results against a reference.
     #[command(subcommand)]
     Eval(Eval),
+    /// Look into saved maps, export them, find a place in them, put them together.
+    #[command(subcommand)]
+    Map(map::Map),
     /// Check what is installed, what can be opened, and what rights hachi has here.
     Doctor(DoctorArguments),
 }
@@ -124,7 +128,7 @@ pub(crate) fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Metres, more than zero.
-fn metres(text: &str) -> Result<f64, String> {
+pub(crate) fn metres(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("expected a number of metres, more than 0".to_owned()),

@@ -6,6 +6,7 @@ pub mod doctor;
 pub mod eval_loops;
 pub mod eval_registration;
 pub mod eval_trajectory;
+pub mod map;
 pub mod replay;
 
 use crate::cli::{Command, Eval};
@@ -23,6 +24,7 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Eval(Eval::Loops(arguments)) => eval_loops::run(&arguments),
         Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
+        Command::Map(command) => map::run(&command),
         Command::Doctor(arguments) => doctor::run(&arguments),
     }
 }

@@ -17,6 +17,7 @@
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
 //! | [`results`] | the files of a run |
+//! | [`saved_maps`] | saved maps as the commands open them |
 
 pub mod cli;
 pub mod commands;
@@ -35,6 +36,7 @@ pub mod progress;
 pub mod recording;
 pub mod report;
 pub mod results;
+pub mod saved_maps;
 pub mod slam_stage;
 
 use std::ffi::OsString;

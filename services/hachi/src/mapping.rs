@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use hachi_cloud::{Filtered, Filters, IntensityUse, RemovalCounts, ScanFrames};
 use hachi_hal::{ImuSample, OdometrySample, Point, Pose, ScanHeader, Stamp};
 use hachi_odometry::{Condition, Estimate, Odometry, ScanInput};
-use hachi_slam::SubmapStore;
+use hachi_slam::{Slam, SlamEstimate};
 use hachi_trajectory::Trajectory;
 use indicatif::ProgressBar;
 use tracing::{info, warn};
@@ -92,15 +92,11 @@ impl Mapping {
         })
     }
 
-    /// With SLAM, which keeps its map in `store`: loops close, and the map is made of its submaps.
+    /// With SLAM: loops close, and the map is made of its submaps.
     #[must_use]
-    pub fn with_slam(mut self, store: Box<dyn SubmapStore>) -> Self {
+    pub fn with_slam(mut self, slam: Slam) -> Self {
         let base_from_lidar = self.frames.base_from_lidar;
-        self.slam = Some(SlamStage::new(
-            self.config.slam.clone(),
-            base_from_lidar,
-            store,
-        ));
+        self.slam = Some(SlamStage::new(slam, base_from_lidar));
         self
     }
 
@@ -222,6 +218,11 @@ impl Mapping {
         self.slam
             .as_ref()
             .map_or_else(|| self.trajectory.clone(), SlamStage::odometry)
+    }
+
+    /// Where the last scan was on the map, with SLAM.
+    pub fn place(&self) -> Option<SlamEstimate> {
+        self.slam.as_ref().and_then(SlamStage::place)
     }
 
     /// SLAM, if it is part of the flow.

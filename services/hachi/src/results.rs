@@ -108,7 +108,11 @@ impl Results {
         report.write(&self.path("report.json"))
     }
 
-    fn write(&self, name: &str, content: &[u8]) -> Result<(), Failure> {
+    /// A file with this content, whole or not at all.
+    ///
+    /// # Errors
+    /// It can't be written.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<(), Failure> {
         write_file(self.path(name), content).map_err(|error| Failure::unwritten(&error))
     }
 }

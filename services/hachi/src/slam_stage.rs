@@ -8,9 +8,7 @@ use hachi_hal::{Point, Pose, ScanHeader, Stamp, Vector3};
 use hachi_odometry::{Estimate, Odometry};
 use hachi_registration::Degeneracy;
 use hachi_slam::ledger::FoundBy;
-use hachi_slam::{
-    LedgerEntry, LoopCounts, ScanInput, Slam, SlamConfig, SlamEstimate, SlamEvents, SubmapStore,
-};
+use hachi_slam::{LedgerEntry, LoopCounts, Map, NodeId, ScanInput, Slam, SlamEstimate, SlamEvents};
 use hachi_trajectory::Trajectory;
 use tracing::{info, warn};
 
@@ -24,20 +22,21 @@ pub struct SlamStage {
     base_from_lidar: Pose,
     /// The session's scans as odometry placed them.
     scans: Vec<(Stamp, Pose)>,
-    session: u32,
+    /// Where the last of them was.
+    place: Option<SlamEstimate>,
     points: Vec<Point>,
     events: SlamEvents,
     store_failed: bool,
 }
 
 impl SlamStage {
-    /// SLAM that keeps its nodes in `store`.
-    pub fn new(config: SlamConfig, base_from_lidar: Pose, store: Box<dyn SubmapStore>) -> Self {
+    /// SLAM, new or going on with a saved map, for a LiDAR that sits there.
+    pub fn new(slam: Slam, base_from_lidar: Pose) -> Self {
         Self {
-            slam: Slam::new(config, store),
+            slam,
             base_from_lidar,
+            place: None,
             scans: Vec::new(),
-            session: 0,
             points: Vec::new(),
             events: SlamEvents::default(),
             store_failed: false,
@@ -69,8 +68,14 @@ impl SlamStage {
             points: &self.points,
         };
         let placed = self.slam.step(&scan, &mut self.events);
+        self.place = Some(placed);
         self.say();
         placed
+    }
+
+    /// Where the last scan was, as it was known then.
+    pub fn place(&self) -> Option<SlamEstimate> {
+        self.place
     }
 
     /// The end of the run: what is under way is finished and kept.
@@ -137,7 +142,7 @@ impl SlamStage {
             .map()
             .nodes()
             .iter()
-            .filter(|n| n.session == self.session)
+            .filter(|n| n.session == self.slam.session())
             .copied()
             .collect();
         let mut trajectory = Trajectory::new();
@@ -164,20 +169,7 @@ impl SlamStage {
     /// # Errors
     /// A submap can't be read back.
     pub fn build_map(&mut self, map: &mut MapBuilder) -> Result<(), Failure> {
-        let nodes = self.slam.map().nodes().to_vec();
-        for node in &nodes {
-            let submap = self.slam.map_mut().submap(node.id).map_err(|error| {
-                Failure::new(
-                    error,
-                    "see the message; the map without it can't be written",
-                )
-            })?;
-            for p in &submap.points {
-                let placed = node.map_from_node * nalgebra::Point3::from(p.position.map(f64::from));
-                map.add([placed.x, placed.y, placed.z], f32::from(p.intensity));
-            }
-        }
-        Ok(())
+        add_submaps(self.slam.map_mut(), map)
     }
 
     /// How many candidates there were, and what became of them.
@@ -199,16 +191,38 @@ impl SlamStage {
     /// The ledger as a table: the first four columns as every run writes them.
     pub fn ledger_csv(&self) -> String {
         let map = self.slam.map();
-        let scan_of = |entry_node| {
-            let stamp = map.node(entry_node).map(|n| n.stamp)?;
-            self.scans.binary_search_by_key(&stamp, |s| s.0).ok()
-        };
-        let mut table = LEDGER_HEADING.to_owned();
-        for entry in map.ledger() {
-            table.push_str(&row(entry, scan_of(entry.node), scan_of(entry.candidate)));
-        }
-        table
+        ledger_table(map, |id| {
+            let node = map.node(id).filter(|n| n.session == self.slam.session())?;
+            self.scans.binary_search_by_key(&node.stamp, |s| s.0).ok()
+        })
     }
+}
+
+/// Adds all submaps, where their nodes are now, to a cloud.
+///
+/// # Errors
+/// A submap can't be read back.
+pub fn add_submaps(map: &mut Map, cloud: &mut MapBuilder) -> Result<(), Failure> {
+    let nodes = map.nodes().to_vec();
+    for node in &nodes {
+        let submap = map
+            .submap(node.id)
+            .map_err(|error| Failure::new(error, "restore the map from a copy, or map anew"))?;
+        for p in &submap.points {
+            let place = hachi_slam::grid::placed(&node.map_from_node, p.position);
+            cloud.add(place, f32::from(p.intensity));
+        }
+    }
+    Ok(())
+}
+
+/// The ledger of a map as a table; `scan_of` gives the number of a node's first scan in this run.
+pub fn ledger_table(map: &Map, scan_of: impl Fn(NodeId) -> Option<usize>) -> String {
+    let mut table = LEDGER_HEADING.to_owned();
+    for entry in map.ledger() {
+        table.push_str(&row(entry, scan_of(entry.node), scan_of(entry.candidate)));
+    }
+    table
 }
 
 /// Heading of the ledger's table.

@@ -7,7 +7,8 @@
 use hachi_hal::Pose;
 use nalgebra::Matrix6;
 
-use crate::alignment::Alignment;
+use crate::alignment::{Aligned, Alignment};
+use crate::ground::laid_on;
 use crate::growing::GrownSubmap;
 use crate::map::{Map, difference, stepped};
 use crate::node::NodeId;
@@ -20,6 +21,13 @@ const REACH_M: f32 = 60.0;
 /// Squared Mahalanobis distance between odometry and alignment beyond which one of them is wrong;
 /// and odometry, which followed every scan, is seldom. Six degrees of freedom, one in a million.
 const ABSURD: f64 = 38.0;
+
+/// Information that is left of odometry's where it contradicts an alignment that fits: ten times the
+/// standard deviation, so that loops may say where the fault lies.
+const DOUBT: f64 = 0.01;
+
+/// How much better one of two placements has to fit.
+const CLEARLY: f64 = 1.15;
 
 /// An alignment with less than this is of no use.
 const LEAST_OVERLAP: f64 = 0.3;
@@ -45,14 +53,13 @@ impl ChainAlignment {
     /// Begins; `previous` are the nodes to align with, the last first. `false` if there is nothing
     /// to align with: then the way alone counts.
     pub fn begin(&mut self, map: &mut Map, grown: &GrownSubmap, previous: &[NodeId]) -> bool {
-        let (Some((way, covariance)), Some(last)) = (grown.way, previous.first()) else {
+        let last = previous.first().and_then(|id| map.node(*id)).copied();
+        let (Some((way, covariance)), Some(last)) = (grown.way, last) else {
             return false;
         };
         self.expected = way;
         self.way_information = covariance.information();
-        let Some(map_from_last) = map.node(*last).map(|n| n.map_from_node) else {
-            return false;
-        };
+        let map_from_last = last.map_from_node;
         let centre = way.translation.vector.cast::<f32>().into();
         self.target.clear();
         for id in previous {
@@ -68,32 +75,49 @@ impl ChainAlignment {
         self.source.clear();
         self.source
             .add(&grown.submap, &Pose::identity(), [0.0; 3], REACH_M);
-        self.alignment.begin_close(&self.source, &way);
+        let mended = grown
+            .ground
+            .and_then(|ground| laid_on(&last.ground, &ground, &way));
+        match mended {
+            // Odometry and the ground disagree: both are tried.
+            Some(mended) => self.alignment.begin(&self.source, &[way, mended]),
+            None => self.alignment.begin_close(&self.source, &way),
+        }
         true
     }
 
     /// A step; the edge from the last node when it is known.
     pub fn step(&mut self) -> Option<(Pose, Matrix6<f64>)> {
         let aligned = self.alignment.step(&self.target)?;
-        let odometry = (self.expected, self.way_information);
         let (found, fitness) = (&aligned.found, &aligned.fitness);
-        if !found.converged
-            || fitness.overlap < LEAST_OVERLAP
-            || fitness.inlier_share() < LEAST_INLIERS
-        {
-            return Some(odometry);
+        if !found.converged || fitness.overlap < LEAST_OVERLAP {
+            return Some((self.expected, self.way_information));
         }
-        let off = difference(&self.expected, &found.target_from_source);
-        if (off.transpose() * self.way_information * off)[0] > ABSURD {
-            return Some(odometry);
+        if fitness.inlier_share() < LEAST_INLIERS {
+            return Some((self.expected, self.way_information * DOUBT));
         }
         let seen = found.degeneracy.projection_on_observed();
         let hessian = seen.transpose() * found.information * seen;
         let metric = translation_first(&hessian) * metric_scale(fitness);
         let of_surfaces = bounded(&metric, LEAST_SIGMA_M, LEAST_SIGMA_RAD);
+        let off = difference(&self.expected, &found.target_from_source);
+        let apart = (off.transpose() * self.way_information * off)[0];
+        if aligned.guess > 0 && self.is_better(&aligned) {
+            // The ground was right.
+            return Some((found.target_from_source, of_surfaces));
+        }
+        if apart > ABSURD {
+            return Some((self.expected, self.way_information * DOUBT));
+        }
         // The two say the same but for a small step: weighed by what each knows of it.
         let both = of_surfaces + self.way_information;
         let step = invert(&both) * of_surfaces * off;
         Some((stepped(&self.expected, &step), both))
+    }
+
+    /// Whether what the ground led to fits clearly better than what odometry led to.
+    fn is_better(&self, aligned: &Aligned) -> bool {
+        let fit = |guess| self.alignment.guess_fitness(guess).unwrap_or(0.0);
+        fit(aligned.guess) > CLEARLY * fit(0)
     }
 }

@@ -4,7 +4,7 @@
 //! candidates there are ([`candidates`](crate::candidates)), what a loop does to the map
 //! ([`Map::add_loops`](crate::map::Map::add_loops)).
 
-use hachi_hal::Pose;
+use hachi_hal::{Pose, Rotation};
 use nalgebra::Matrix6;
 
 use crate::alignment::{Aligned, Alignment};
@@ -95,8 +95,12 @@ impl Closing {
             entry.similarity = looks.similarity;
             entry.yaw_rad = looks.yaw_rad;
             let mut by_looks = looks.candidate_from_query();
-            by_looks.translation.z += f64::from(old.ground_m - node.ground_m);
+            by_looks.translation.z += f64::from(node.ground.below_m - old.ground.below_m);
             add(by_looks);
+            if node.piece != old.piece {
+                // A corridor looks much the same both ways.
+                add(by_looks * Rotation::from_euler_angles(0.0, 0.0, std::f64::consts::PI));
+            }
         }
         if let Some(proposed) = candidate.proposed {
             add(proposed);
@@ -129,7 +133,13 @@ impl Closing {
             entry.graph_fitness = of_guess(0);
         }
         if candidate.looks.is_some() {
-            entry.looks_fitness = of_guess(usize::from(same_piece));
+            let first = usize::from(same_piece);
+            let about = if same_piece {
+                f32::NAN
+            } else {
+                of_guess(first + 1)
+            };
+            entry.looks_fitness = of_guess(first).max(about);
         }
         entry.overlap = fitness.overlap as f32;
         entry.inlier_share = fitness.inlier_share() as f32;

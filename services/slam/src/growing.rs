@@ -7,13 +7,17 @@ use hachi_hal::{Pose, Stamp, Vector3};
 use hachi_odometry::Condition;
 
 use crate::config::SlamConfig;
+use crate::ground::GroundSeeker;
 use crate::input::ScanInput;
-use crate::node::levelled;
+use crate::node::{Ground, levelled};
 use crate::submap::{Submap, SubmapBuilder};
 use crate::uncertainty::WayCovariance;
 
 /// A node is not fixed before this many scans: what it costs is spread over them.
 const LEAST_SCANS: usize = 10;
+
+/// A robot that stands and does not know where it is looks around for this many scans.
+const STANDING_SCANS: usize = 20;
 
 /// A scan joins the submap when the robot has moved this far since the last that did, or turned.
 const SCAN_EVERY_M: f64 = 0.2;
@@ -33,6 +37,8 @@ pub struct GrownSubmap {
     pub path_m: f64,
     /// Its surfaces.
     pub submap: Submap,
+    /// The ground under it, where one was found.
+    pub ground: Option<Ground>,
     /// Takes points of its frame to that of the submap before it, by odometry; with how surely.
     /// `None` for the first of a piece.
     pub way: Option<(Pose, WayCovariance)>,
@@ -42,6 +48,7 @@ pub struct GrownSubmap {
 #[derive(Debug, Default)]
 pub struct Growing {
     builder: SubmapBuilder,
+    seeker: GroundSeeker,
     begun: Option<Begun>,
     /// The last scan that was placed.
     last: Option<Pose>,
@@ -151,12 +158,17 @@ impl Growing {
     }
 
     /// Whether the submap is full.
-    pub fn is_full(&self, config: &SlamConfig) -> bool {
+    ///
+    /// One that looks for its place (`alone`) is full after a while even if the robot stands.
+    pub fn is_full(&self, alone: bool, config: &SlamConfig) -> bool {
         let (Some(begun), Some(last)) = (&self.begun, &self.last) else {
             return false;
         };
         if begun.scans < LEAST_SCANS || self.builder.is_empty() {
             return false;
+        }
+        if alone && begun.scans >= STANDING_SCANS {
+            return true;
         }
         let turned = begun.odom_from_first.rotation.angle_to(&last.rotation);
         // Cubes grow with the distances seen; ten of them are a step that shows something new.
@@ -190,6 +202,7 @@ impl Growing {
             stamp: begun.stamp,
             odom_from_node: begun.odom_from_node,
             path_m: begun.path_m,
+            ground: self.seeker.find(&submap),
             submap,
             way,
         })

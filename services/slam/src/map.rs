@@ -121,38 +121,13 @@ impl Map {
         for (node, bytes) in &saved.descriptors {
             map.places.insert_bytes(*node, bytes);
         }
-        for piece in (0..saved.pieces()).map(PieceId) {
-            map.begin_piece();
-            let of_piece = |id: NodeId| saved.nodes[id.index()].piece == piece;
-            let mut placed = saved
-                .nodes
-                .iter()
-                .filter(|n| n.piece == piece)
-                .map(|n| (n.id, n.map_from_node));
-            let slot = &mut map.pieces[piece.0 as usize];
-            let Some((first, pose)) = placed.next() else {
-                // Only a joined piece has no nodes of its own; which it was joined to is of no
-                // matter any more.
-                slot.joined_to = Some(PieceId(0));
-                continue;
-            };
-            let rest: Vec<(NodeId, Pose)> = placed.collect();
-            let edges: Vec<Edge> = saved
-                .edges
-                .iter()
-                .filter(|e| of_piece(e.first) && of_piece(e.second))
-                .copied()
-                .collect();
-            let mut graph = PoseGraph::new(first, &pose)?;
-            graph.update(&rest, &edges, &[])?;
-            graph.settle()?;
-            slot.graph = Some(graph);
-        }
         map.next_edge = saved.edges.iter().map(|e| e.id + 1).max().unwrap_or(0);
         map.pending.stored = saved.nodes.iter().map(|n| n.map_from_node).collect();
+        let pieces = saved.pieces();
         (map.nodes, map.edges, map.ledger) = (saved.nodes, saved.edges, saved.ledger);
-        for piece in 0..map.pieces.len() as u32 {
-            map.take_poses(PieceId(piece));
+        for _ in 0..pieces {
+            let piece = map.begin_piece();
+            map.build_graph(piece)?;
         }
         Ok(map)
     }
@@ -253,6 +228,93 @@ impl Map {
             self.pending.edges.push(edge);
         }
         self.take_poses(node.piece);
+        Ok(())
+    }
+
+    /// Adds a node of another map, described before; it hangs on nothing until [`Map::hold`].
+    pub fn add_bare(&mut self, node: Node, submap: Arc<Submap>) {
+        let mut bytes = Vec::new();
+        codec::encode(&submap, &mut bytes);
+        self.cache.insert(node.id, submap);
+        self.pending
+            .nodes
+            .push((node.id, bytes, self.places.bytes()));
+        self.places.insert(node.id);
+        self.nodes.push(node);
+    }
+
+    /// Holds the nodes from `first` on together by the edges of the map they come from, whose numbers
+    /// they count on; its ledger goes on this one's.
+    ///
+    /// # Errors
+    /// The edges do not hold the nodes.
+    pub fn hold(
+        &mut self,
+        first: u32,
+        edges: &[Edge],
+        ledger: &[LedgerEntry],
+    ) -> Result<(), GraphError> {
+        let on = |id: NodeId| NodeId(first + id.0);
+        let loops = self.ledger.len() as u32;
+        self.ledger.extend(ledger.iter().map(|entry| LedgerEntry {
+            id: LoopId(loops + entry.id.0),
+            node: on(entry.node),
+            candidate: on(entry.candidate),
+            ..*entry
+        }));
+        self.pending
+            .ledger
+            .extend((loops..self.ledger.len() as u32).map(LoopId));
+        let edges: Vec<Edge> = edges
+            .iter()
+            .zip(self.next_edge..)
+            .map(|(edge, id)| Edge {
+                id,
+                kind: match edge.kind {
+                    EdgeKind::Chain => EdgeKind::Chain,
+                    EdgeKind::Loop(of) => EdgeKind::Loop(LoopId(loops + of.0)),
+                },
+                first: on(edge.first),
+                second: on(edge.second),
+                ..*edge
+            })
+            .collect();
+        self.next_edge += edges.len() as u32;
+        self.edges.extend_from_slice(&edges);
+        self.pending.edges.extend_from_slice(&edges);
+        for piece in (0..self.pieces.len() as u32).map(PieceId) {
+            if self.pieces[piece.0 as usize].graph.is_none() {
+                self.build_graph(piece)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes a piece's graph from its nodes and edges.
+    fn build_graph(&mut self, piece: PieceId) -> Result<(), GraphError> {
+        let nodes = &self.nodes;
+        let of_piece = |id: NodeId| nodes[id.index()].piece == piece;
+        let mut placed = nodes
+            .iter()
+            .filter(|n| n.piece == piece)
+            .map(|n| (n.id, n.map_from_node));
+        let Some((first, pose)) = placed.next() else {
+            // Only a joined piece has no nodes of its own; to which is of no matter any more.
+            self.pieces[piece.0 as usize].joined_to = Some(PieceId(0));
+            return Ok(());
+        };
+        let rest: Vec<(NodeId, Pose)> = placed.collect();
+        let edges: Vec<Edge> = self
+            .edges
+            .iter()
+            .filter(|e| of_piece(e.first) && of_piece(e.second))
+            .copied()
+            .collect();
+        let mut graph = PoseGraph::new(first, &pose)?;
+        graph.update(&rest, &edges, &[])?;
+        graph.settle()?;
+        self.pieces[piece.0 as usize].graph = Some(graph);
+        self.take_poses(piece);
         Ok(())
     }
 

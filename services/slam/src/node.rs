@@ -48,8 +48,32 @@ pub struct Node {
     pub map_from_node: Pose,
     /// Distance travelled in the session when it began, metres.
     pub path_m: f64,
-    /// Height of the ground below the node's origin, metres (negative: the base is above it).
-    pub ground_m: f32,
+    /// The ground under it.
+    pub ground: Ground,
+}
+
+/// The ground as a plane in a node's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground {
+    /// Its normal, unit length, upwards.
+    pub up: [f32; 3],
+    /// How far below the node's origin it is, metres.
+    pub below_m: f32,
+}
+
+impl Ground {
+    /// Level, so far below.
+    pub const fn level(below_m: f32) -> Self {
+        Self {
+            up: [0.0, 0.0, 1.0],
+            below_m,
+        }
+    }
+
+    /// Height of a position over it, metres.
+    pub fn height(&self, p: [f32; 3]) -> f32 {
+        self.up[0] * p[0] + self.up[1] * p[1] + self.up[2] * p[2] + self.below_m
+    }
 }
 
 /// The levelled frame of a base: the same origin, z along `up`, x the base's x laid level.

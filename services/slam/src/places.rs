@@ -7,7 +7,7 @@ use hachi_cloud::{CeilingFilter, Reason};
 use hachi_hal::{Point, Pose};
 use hachi_place::{Database, Describer, DescriberConfig, Descriptor, Match, Profile};
 
-use crate::node::NodeId;
+use crate::node::{Ground, NodeId};
 use crate::submap::Submap;
 
 /// Describes submaps and remembers them; keeps its buffers.
@@ -25,8 +25,8 @@ pub struct Places {
 
 impl Places {
     /// Describes a place, as seen from the node and from beside it; what [`Places::query`] and
-    /// [`Places::insert`] then work with. `ground_m` is the ground's height in the node's frame.
-    pub fn describe(&mut self, submap: &Submap, ground_m: f32) {
+    /// [`Places::insert`] then work with.
+    pub fn describe(&mut self, submap: &Submap, ground: &Ground) {
         self.points.clear();
         self.points.extend(submap.points.iter().map(|p| Point {
             intensity: f32::from(p.intensity),
@@ -34,7 +34,8 @@ impl Places {
         }));
         self.labels.clear();
         self.labels.resize(self.points.len(), Reason::Kept);
-        let footprint_from_node = Pose::translation(0.0, 0.0, -f64::from(ground_m));
+        // Levelled by gravity, not by the ground: a place on a slope looks the same either way round.
+        let footprint_from_node = Pose::translation(0.0, 0.0, f64::from(ground.below_m));
         // A ceiling looks the same everywhere, and is higher than all that tells places apart.
         self.ceiling
             .label(&self.points, &footprint_from_node, &mut self.labels);
@@ -42,7 +43,7 @@ impl Places {
         let kept = self.points.iter().zip(&self.labels);
         self.cloud.extend(
             kept.filter(|(_, label)| label.is_kept())
-                .map(|(p, _)| [p.x, p.y, p.z - ground_m, p.intensity]),
+                .map(|(p, _)| [p.x, p.y, p.z + ground.below_m, p.intensity]),
         );
         let describer = self.describer.get_or_insert_with(|| {
             let profile = Profile::for_cloud(&self.cloud).unwrap_or(Profile::OUTDOOR);

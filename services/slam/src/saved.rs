@@ -8,7 +8,7 @@ use nalgebra::Matrix6;
 
 use crate::edge::{Edge, EdgeKind};
 use crate::ledger::LedgerEntry;
-use crate::node::{Node, NodeId, PieceId};
+use crate::node::{Ground, Node, NodeId, PieceId};
 
 /// More nodes than any robot makes: a node every two metres for 8,000 km.
 pub const MOST_NODES: usize = 1 << 22;
@@ -86,7 +86,7 @@ impl SavedMap {
             if !is_pose(&node.map_from_node)
                 || !is_pose(&node.odom_from_node)
                 || !node.path_m.is_finite()
-                || !node.ground_m.is_finite()
+                || !is_ground(&node.ground)
             {
                 return Err(not_finite("node", node.id.0));
             }
@@ -154,6 +154,11 @@ const FARTHEST_M: f64 = 1e7;
 fn is_pose(pose: &Pose) -> bool {
     let near = |c: &f64| c.abs() < FARTHEST_M;
     pose.translation.vector.iter().all(near) && (pose.rotation.as_ref().norm() - 1.0).abs() < 1e-6
+}
+
+fn is_ground(ground: &Ground) -> bool {
+    let length: f32 = ground.up.iter().map(|c| c * c).sum();
+    (length - 1.0).abs() < 1e-2 && ground.below_m.abs() < 1e3
 }
 
 fn is_information(information: &Matrix6<f64>) -> bool {

@@ -98,7 +98,8 @@ impl Slam {
             self.hand_over(rest, events);
             return self.estimate(scan);
         }
-        let full = self.growing.is_full(&self.config);
+        let alone = self.workshop.is_floating(&self.map) && self.workshop.last().is_none();
+        let full = self.growing.is_full(alone, &self.config);
         if full {
             let grown = self.growing.take(scan, &up);
             self.hand_over(grown, events);

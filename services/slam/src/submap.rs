@@ -62,37 +62,6 @@ impl Submap {
             + self.points.capacity() * size_of::<SubmapPoint>()
             + self.viewpoints.capacity() * size_of::<[f32; 3]>()
     }
-
-    /// Height of the ground below the node's origin, metres: the lowest level that carries a good
-    /// share of the near level surfaces. `None` if there is no such.
-    pub fn ground_m(&self) -> Option<f32> {
-        const REACH_M: f32 = 8.0;
-        const LAYER_M: f32 = 0.1;
-        const LAYERS: usize = 64;
-        // Down to 6.4 m below the base: nothing that walks or is carried is higher.
-        let mut count = [0u32; LAYERS];
-        let mut sum = [0.0f32; LAYERS];
-        for p in &self.points {
-            let [x, y, z] = p.position;
-            if p.normal[2].abs() < 0.9 || x * x + y * y > REACH_M * REACH_M || z > 0.0 {
-                continue;
-            }
-            let layer = (-z / LAYER_M) as usize;
-            if layer < LAYERS {
-                count[layer] += 1;
-                sum[layer] += z;
-            }
-        }
-        // A floor straddles two layers as often as not.
-        let pair = |i: usize| count[i] + count.get(i + 1).copied().unwrap_or(0);
-        let most = (0..LAYERS).map(pair).max()?;
-        if most < 20 {
-            return None;
-        }
-        let lowest = (0..LAYERS).rev().find(|&i| pair(i) * 3 > most)?;
-        let height = sum[lowest] + sum.get(lowest + 1).copied().unwrap_or(0.0);
-        Some(height / pair(lowest) as f32)
-    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -413,14 +382,12 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_carry_their_normal_intensity_and_ground() {
+    fn surfaces_carry_their_normal_and_intensity() {
         let mut builder = SubmapBuilder::default();
         builder.add([0.0; 3], corner(0.04).into_iter());
         let mut submap = Submap::default();
         builder.finish(&mut submap);
         assert!(submap.points.len() <= MOST_POINTS);
-        let ground = submap.ground_m().unwrap();
-        assert!((ground + 0.5).abs() < 0.01, "{ground}");
         for p in &submap.points {
             let [x, y, z] = p.position;
             if x < 3.0 && x.abs() < 3.5 && y.abs() < 3.5 {
@@ -466,6 +433,6 @@ mod tests {
         assert!(builder.is_empty());
         let mut submap = Submap::default();
         builder.finish(&mut submap);
-        assert!(submap.points.is_empty() && submap.ground_m().is_none());
+        assert!(submap.points.is_empty());
     }
 }

@@ -34,7 +34,7 @@ pub fn corrected(nodes: &[Node], stamp: Stamp, odom_from_base: &Pose) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::node::{NodeId, PieceId};
+    use crate::node::{Ground, NodeId, PieceId};
 
     fn node(id: u32, second: i64, odom_x: f64, map: Pose, chained: bool) -> Node {
         Node {
@@ -46,7 +46,7 @@ mod tests {
             odom_from_node: Pose::translation(odom_x, 0.0, 0.0),
             map_from_node: map,
             path_m: odom_x,
-            ground_m: -0.5,
+            ground: Ground::level(0.5),
         }
     }
 

@@ -18,11 +18,11 @@ use crate::growing::GrownSubmap;
 use crate::input::SlamEvents;
 use crate::ledger::{FoundBy, LedgerEntry, LoopId, Refusal, Verdict};
 use crate::map::Map;
-use crate::node::{Node, NodeId, PieceId};
+use crate::node::{Ground, Node, NodeId, PieceId};
 use crate::recognition::Recognition;
 
 /// The ground below the base, metres, where no submap has shown it yet.
-const USUAL_GROUND_M: f32 = -0.5;
+const USUAL_GROUND_M: f32 = 0.5;
 
 /// Proposals that wait to be checked.
 const MOST_PROPOSED: usize = 64;
@@ -73,7 +73,7 @@ pub struct Workshop {
     recent: VecDeque<NodeId>,
     piece: Option<PieceId>,
     session: u32,
-    ground_m: Option<f32>,
+    ground: Option<Ground>,
     map_from_odom: Pose,
 }
 
@@ -230,9 +230,9 @@ impl Workshop {
             || self.map_from_odom * grown.odom_from_node,
             |(last, (last_from_node, _))| last.map_from_node * last_from_node,
         );
-        let ground_m = grown.submap.ground_m().or(self.ground_m);
-        self.ground_m = ground_m;
-        let ground_m = ground_m.unwrap_or(USUAL_GROUND_M);
+        let ground = grown.ground.or(self.ground);
+        self.ground = ground;
+        let ground = ground.unwrap_or(Ground::level(USUAL_GROUND_M));
         let id = NodeId(map.nodes().len() as u32);
         let node = Node {
             id,
@@ -243,9 +243,9 @@ impl Workshop {
             odom_from_node: grown.odom_from_node,
             map_from_node,
             path_m: grown.path_m,
-            ground_m,
+            ground,
         };
-        map.places.describe(&grown.submap, ground_m);
+        map.places.describe(&grown.submap, &ground);
         let edge = edge.map(|(last, (pose, information))| (last.id, pose, information));
         if let Err(error) = map.add_node(node, Arc::new(grown.submap), edge) {
             events.graph_errors.push(error);
@@ -269,13 +269,10 @@ impl Workshop {
         if self.is_floating(map)
             && let Some(piece) = self.piece
         {
-            self.recognition.count_node();
             recognised(map, piece, &mut self.found);
             rest.extend(self.found.drain(..));
         }
-        if !rest.is_empty() {
-            self.stage = Stage::Proving { node, rest };
-        }
+        self.stage = Stage::Proving { node, rest };
     }
 
     /// Lays out the next candidate.
@@ -290,8 +287,9 @@ impl Workshop {
     ) -> Work {
         let (Some(candidate), Some(stamp)) = (rest.pop_front(), map.node(node).map(|n| n.stamp))
         else {
+            let work = self.conclude(node, map, events);
             self.keep(map, events);
-            return Work::Going;
+            return work;
         };
         let mut entry = map.open_entry(stamp, node, candidate.node, candidate.found_by);
         if hurry {
@@ -338,25 +336,36 @@ impl Workshop {
         let judged = self
             .closing
             .judge(&mut entry, &candidate, &aligned, same_piece, config);
+        let recognising = !same_piece;
         let mut proven = match judged {
             Ok(proven) => proven,
             Err(refusal) => {
+                if recognising {
+                    self.recognition.vote(map, &entry, None);
+                }
                 refuse(map, entry, refusal, events);
                 return Work::Going;
             }
         };
-        if same_piece {
-            let loops = self.closing.agree(map, &mut proven);
-            map.close_entry(proven.entry);
-            events.ledger.push(proven.entry);
-            return self.close(&loops, map, events);
+        if recognising {
+            self.recognition.vote(map, &entry, Some(proven.information));
+            map.close_entry(entry);
+            events.ledger.push(entry);
+            return Work::Going;
         }
+        let loops = self.closing.agree(map, &mut proven);
         map.close_entry(proven.entry);
         events.ledger.push(proven.entry);
-        let Some(found) = self.recognition.vote(map, &proven) else {
+        self.close(&loops, map, events)
+    }
+
+    /// All candidates of a node were asked: perhaps it is clear now where the piece lies.
+    fn conclude(&mut self, node: NodeId, map: &mut Map, events: &mut SlamEvents) -> Work {
+        if !self.is_floating(map) {
             return Work::Going;
-        };
-        let Some(piece) = self.piece else {
+        }
+        let found = self.recognition.conclude(map, node);
+        let (Some(found), Some(piece)) = (found, self.piece) else {
             return Work::Going;
         };
         match map.join(piece, found.target, &found.target_from_piece, &found.loops) {
@@ -366,11 +375,6 @@ impl Workshop {
                 events.moved = true;
                 self.piece = Some(found.target);
                 self.recognition.clear();
-                // What else there is was asked of another piece.
-                self.stage = Stage::Proving {
-                    node,
-                    rest: VecDeque::new(),
-                };
                 Work::Moved
             }
             Err(error) => {

@@ -171,6 +171,23 @@ impl MapFile {
         &self.identity
     }
 
+    /// Lets the file grow to so many bytes and no further: writing then fails as on a full disk. A
+    /// file that is larger stays as it is.
+    ///
+    /// # Errors
+    /// The file can't be read.
+    pub fn set_quota(&self, bytes: u64) -> Result<(), MapError> {
+        let set = || -> rusqlite::Result<()> {
+            let page: i64 = self
+                .connection
+                .pragma_query_value(None, "page_size", |row| row.get(0))?;
+            let pages = i64::try_from(bytes).unwrap_or(i64::MAX) / page.max(1);
+            self.connection
+                .pragma_update(None, "max_page_count", pages.max(1))
+        };
+        set().map_err(|error| MapError::of(&self.path, &error))
+    }
+
     /// Reads everything but the submaps.
     ///
     /// # Errors
@@ -333,7 +350,7 @@ fn put(transaction: &Transaction<'_>, change: &MapChange<'_>) -> rusqlite::Resul
         let n = &new.node;
         transaction
             .prepare_cached(
-                "INSERT OR REPLACE INTO node VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+                "INSERT OR REPLACE INTO node VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
             )?
             .execute(params![
                 n.id.0,
@@ -342,7 +359,10 @@ fn put(transaction: &Transaction<'_>, change: &MapChange<'_>) -> rusqlite::Resul
                 n.chained,
                 n.stamp.as_nanos(),
                 n.path_m,
-                f64::from(n.ground_m),
+                f64::from(n.ground.up[0]),
+                f64::from(n.ground.up[1]),
+                f64::from(n.ground.up[2]),
+                f64::from(n.ground.below_m),
                 pose_bytes(&n.odom_from_node),
                 pose_bytes(&n.map_from_node),
             ])?;

@@ -13,8 +13,8 @@ pub(crate) fn load(connection: &Connection) -> rusqlite::Result<SavedMap> {
     Ok(SavedMap {
         nodes: all(
             connection,
-            "SELECT id, session, piece, chained, stamp_ns, path_m, ground_m, odom_from_node, \
-             map_from_node FROM node ORDER BY id",
+            "SELECT id, session, piece, chained, stamp_ns, path_m, ground_up_x, ground_up_y, \
+             ground_up_z, ground_below_m, odom_from_node, map_from_node FROM node ORDER BY id",
             rows::node,
         )?,
         descriptors: all(

@@ -2,7 +2,7 @@
 
 use hachi_hal::{Pose, Rotation, Stamp, Vector3};
 use hachi_slam::ledger::{FoundBy, LedgerEntry, LoopId, Verdict};
-use hachi_slam::node::{Node, NodeId, PieceId};
+use hachi_slam::node::{Ground, Node, NodeId, PieceId};
 use nalgebra::{Matrix6, Quaternion};
 use rusqlite::Row;
 use rusqlite::types::{FromSqlError, Type};
@@ -83,10 +83,17 @@ pub(crate) fn node(row: &Row<'_>) -> rusqlite::Result<Node> {
         chained: row.get(3)?,
         stamp: Stamp::from_nanos(row.get(4)?),
         path_m: row.get(5)?,
-        ground_m: row.get::<_, f64>(6)? as f32,
-        odom_from_node: pose(row, 7)?,
-        map_from_node: pose(row, 8)?,
+        ground: Ground {
+            up: [single(row, 6)?, single(row, 7)?, single(row, 8)?],
+            below_m: single(row, 9)?,
+        },
+        odom_from_node: pose(row, 10)?,
+        map_from_node: pose(row, 11)?,
     })
+}
+
+fn single(row: &Row<'_>, column: usize) -> rusqlite::Result<f32> {
+    Ok(row.get::<_, f64>(column)? as f32)
 }
 
 /// A figure that may not have been asked for.

@@ -20,7 +20,8 @@ CREATE TABLE about (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE node (
     id INTEGER PRIMARY KEY, session INTEGER NOT NULL, piece INTEGER NOT NULL,
     chained INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, path_m REAL NOT NULL,
-    ground_m REAL NOT NULL, odom_from_node BLOB NOT NULL, map_from_node BLOB NOT NULL
+    ground_up_x REAL NOT NULL, ground_up_y REAL NOT NULL, ground_up_z REAL NOT NULL,
+    ground_below_m REAL NOT NULL, odom_from_node BLOB NOT NULL, map_from_node BLOB NOT NULL
 );
 CREATE TABLE submap (node INTEGER PRIMARY KEY, surfaces BLOB NOT NULL);
 CREATE TABLE place (node INTEGER PRIMARY KEY, descriptor BLOB NOT NULL);

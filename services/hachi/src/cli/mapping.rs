@@ -87,7 +87,7 @@ INPUT is a pcap or pcapng capture, a ROS 2 bag (db3, mcap), a ROS 1 bag, a KITTI
 folder of .bin, .pcd or .ply scans in numeric order with optional times.txt (seconds).
 
 Example:
-  hachi replay drive.pcap --out out/drive --stage odometry")]
+  hachi replay drive.pcap --out out/drive --stage slam --map drive.map")]
 pub struct ReplayArguments {
     /// The recording.
     #[arg(value_name = "INPUT")]
@@ -104,6 +104,9 @@ pub struct ReplayArguments {
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Odometry)]
     pub stage: StageArgument,
+    /// Keep the map in this file, or go on with the one that is there (with --stage slam).
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
     /// Threads to work with [default: one for each core]. The result does not depend on it.
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,

@@ -1,7 +1,7 @@
 //! `hachi demo`: the simulated robot through the whole pipeline, compared with the truth.
 
 use hachi_bridge::message::Sensor;
-use hachi_slam::MemoryStore;
+use hachi_slam::{MemoryStore, Slam};
 use hachi_trajectory::plot::Plot;
 use hachi_trajectory::{Alignment, Evaluation, EvaluationOptions, Trajectory, evaluate};
 use hachi_world::{SensorKind, SimulatedLidar, Simulation, SimulationConfig};
@@ -64,9 +64,11 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     };
     let lidar = SimulatedLidar::new(Simulation::new(world.clone()));
     let mut source = from_packets(driver, lidar, |_| Vec::new());
+    let slam_config = config.slam.clone();
     let mut mapping = Mapping::new(config, results.folder())?;
     if arguments.stage == StageArgument::Slam {
-        mapping = mapping.with_slam(Box::new(MemoryStore::default()));
+        let store = Box::new(MemoryStore::default());
+        mapping = mapping.with_slam(Slam::new(slam_config, store));
     }
 
     let pool = thread_pool(None)?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hachi_slam::MemoryStore;
+use hachi_slam::{MemoryStore, Slam};
 use hachi_trajectory::plot::Plot;
 
 use crate::cli::mapping::{ReplayArguments, StageArgument};
@@ -13,7 +13,7 @@ use crate::mapping::{Ended, Mapping, run as run_mapping, state_of};
 use crate::motion_samples::MotionSamples;
 use crate::report::{Report, RunState};
 use crate::results::Results;
-use crate::{output, progress, recording};
+use crate::{output, progress, recording, saved_maps};
 
 /// Runs the command.
 ///
@@ -31,9 +31,13 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let results = Results::create_for(&arguments.input, &arguments.out)?;
     let cancelled = Cancelled::on_interrupt()?;
     let bar = progress::bar(source.scan_count(), "scans");
+    let slam = match arguments.stage {
+        StageArgument::Odometry => None,
+        StageArgument::Slam => Some(slam(arguments, &config)?),
+    };
     let mut mapping = Mapping::new(config, results.folder())?;
-    if arguments.stage == StageArgument::Slam {
-        mapping = mapping.with_slam(Box::new(MemoryStore::default()));
+    if let Some(slam) = slam {
+        mapping = mapping.with_slam(slam);
     }
 
     let pool = thread_pool(arguments.threads.map(|n| n.get()))?;
@@ -63,6 +67,17 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         output::text(&summary(&report, &mapping, &results))?;
     }
     conclude(ended, &report, &arguments.input)
+}
+
+/// SLAM, with a map in memory or in the file that the user named: begun there, or gone on with.
+fn slam(arguments: &ReplayArguments, config: &MappingConfig) -> Result<Slam, Failure> {
+    let settings = config.slam.clone();
+    let Some(path) = &arguments.map else {
+        return Ok(Slam::new(settings, Box::new(MemoryStore::default())));
+    };
+    let (file, saved) = saved_maps::go_on(path, arguments.platform.as_deref())?;
+    Slam::resume(settings, saved, Box::new(file))
+        .map_err(|error| Failure::new(error, "restore the map from a copy, or map anew"))
 }
 
 /// A pool of this many threads; one for each core if unset.
