@@ -38,7 +38,7 @@ pub fn run(arguments: &MapExportArguments) -> Result<(), Failure> {
     let results = Results::create(&arguments.out)?;
     let nodes: Vec<Node> = map.nodes().to_vec();
 
-    let mut cloud = MapBuilder::new(arguments.voxel_m);
+    let mut cloud = MapBuilder::new(arguments.voxel_m, results.folder());
     add_submaps(&mut map, &mut cloud)?;
     let config = GridConfig {
         resolution_m: arguments.resolution_m,

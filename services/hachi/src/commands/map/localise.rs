@@ -51,7 +51,8 @@ pub fn run(arguments: &MapLocaliseArguments) -> Result<(), Failure> {
     let mut motion = MotionSamples::open(&arguments.input, config.motion)?;
     let cancelled = Cancelled::on_interrupt()?;
     let bar = progress::bar(source.scan_count(), "scans");
-    let mut mapping = Mapping::new(config)?.with_slam(slam);
+    // No map is written: nothing is put into this folder.
+    let mut mapping = Mapping::new(config, &std::env::temp_dir())?.with_slam(slam);
 
     let pool = thread_pool(None)?;
     let mut begun: Option<Stamp> = None;
