@@ -2,6 +2,7 @@
 //!
 //! Only the shape of arguments is here; what they do is in [`commands`](crate::commands).
 
+pub mod graph;
 pub mod mapping;
 
 use std::num::NonZeroUsize;
@@ -37,6 +38,9 @@ pub enum Command {
     /// Measure results against a reference.
     #[command(subcommand)]
     Eval(Eval),
+    /// Work on pose graphs.
+    #[command(subcommand)]
+    Graph(graph::Graph),
     /// Check what is installed, what can be opened, and what rights hachi has here.
     Doctor(DoctorArguments),
 }

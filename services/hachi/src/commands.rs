@@ -5,8 +5,10 @@ pub mod demo;
 pub mod doctor;
 pub mod eval_registration;
 pub mod eval_trajectory;
+pub mod graph_optimize;
 pub mod replay;
 
+use crate::cli::graph::Graph;
 use crate::cli::{Command, Eval};
 use crate::exit::Failure;
 
@@ -21,6 +23,7 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
+        Command::Graph(Graph::Optimize(arguments)) => graph_optimize::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
     }
 }
