@@ -486,7 +486,8 @@ fn the_transformed_check_value_is_for_high_level_states_alone() {
 #[test]
 fn commands_with_a_number_that_is_none_are_not_sent() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let fields: [(&str, fn(&mut HighCmd, f32)); 8] = [
+        type Field = (&'static str, fn(&mut HighCmd, f32));
+        let fields: [Field; 8] = [
             ("foot raise height", |c, v| c.foot_raise_height = v),
             ("body height", |c, v| c.body_height = v),
             ("position", |c, v| c.position[1] = v),

@@ -2,6 +2,7 @@
 //!
 //! Only the shape of arguments is here; what they do is in [`commands`](crate::commands).
 
+pub mod graph;
 pub mod loops;
 pub mod map;
 pub mod mapping;
@@ -42,6 +43,9 @@ pub enum Command {
     /// Look into saved maps, export them, find a place in them, put them together.
     #[command(subcommand)]
     Map(map::Map),
+    /// Work on pose graphs.
+    #[command(subcommand)]
+    Graph(graph::Graph),
     /// Check what is installed, what can be opened, and what rights hachi has here.
     Doctor(DoctorArguments),
 }

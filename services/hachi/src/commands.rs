@@ -6,9 +6,11 @@ pub mod doctor;
 pub mod eval_loops;
 pub mod eval_registration;
 pub mod eval_trajectory;
+pub mod graph_optimize;
 pub mod map;
 pub mod replay;
 
+use crate::cli::graph::Graph;
 use crate::cli::{Command, Eval};
 use crate::exit::Failure;
 
@@ -25,6 +27,7 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
         Command::Map(command) => map::run(&command),
+        Command::Graph(Graph::Optimize(arguments)) => graph_optimize::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
     }
 }

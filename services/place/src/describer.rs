@@ -148,8 +148,8 @@ impl Describer {
                 self.spreads(&self.weighted, false, &mut out.values);
             }
             Kind::GscIntensity => {
-                // NaN is no light at all.
-                self.add_up(points, |p| p[3].max(0.0).min(MAX_INTENSITY));
+                let light = |p: &[f32; 4]| if p[3].is_nan() { 0.0 } else { p[3] };
+                self.add_up(points, |p| light(p).clamp(0.0, MAX_INTENSITY));
                 self.spreads(&self.sums, true, &mut out.values);
             }
         }

@@ -101,7 +101,7 @@ impl Profile {
         {
             return Err(ProfileError::Bins { rings, sectors });
         }
-        if !(max_range_m >= 0.01 && max_range_m <= 1e5) {
+        if !(0.01..=1e5).contains(&max_range_m) {
             return Err(ProfileError::Length {
                 name: "the reach",
                 value: max_range_m,

@@ -40,7 +40,7 @@ impl Default for Options {
         Self {
             method: Method::LevenbergMarquardt,
             max_iterations: 100,
-            relative_tolerance: 1e-9,
+            relative_tolerance: 1e-8,
             absolute_tolerance: 1e-12,
         }
     }
@@ -125,8 +125,11 @@ fn gauss_newton<G: Group>(
 
 /// Damping at the start, as a share of the diagonal: little, so that a good start converges as fast
 /// as Gauss-Newton.
-const FIRST_DAMPING: f64 = 1e-5;
+const FIRST_DAMPING: f64 = 1e-7;
 const LEAST_DAMPING: f64 = 1e-12;
+/// By which damping grows where the error would rise; squared each time, so that a useful damping is
+/// found in a few tries.
+const FIRST_GROWTH: f64 = 4.0;
 /// Beyond this a step is too short to matter.
 const MOST_DAMPING: f64 = 1e12;
 
@@ -139,7 +142,7 @@ fn levenberg_marquardt<G: Group>(
     report: &mut Report,
 ) -> Result<(), Error> {
     let mut damping = FIRST_DAMPING;
-    let mut growth = 2.0;
+    let mut growth = FIRST_GROWTH;
     let mut error = report.initial_error;
     let mut trial = graph.poses.clone();
     while report.iterations < options.max_iterations && !report.converged {
@@ -159,14 +162,14 @@ fn levenberg_marquardt<G: Group>(
                 error = new_error;
                 let shrink = 1.0 - (2.0 * gain - 1.0).powi(3);
                 damping = (damping * shrink.max(0.1)).max(LEAST_DAMPING);
-                growth = 2.0;
+                growth = FIRST_GROWTH;
                 break;
             }
             if report.converged {
                 break;
             }
             damping *= growth;
-            growth *= 2.0;
+            growth *= growth;
             if damping > MOST_DAMPING {
                 report.final_error = error;
                 return Ok(());

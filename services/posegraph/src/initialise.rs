@@ -4,6 +4,7 @@
 //! a solver can start from. Fixed poses, and of each part without one the pose with the smallest
 //! key, stay where they are.
 
+mod best;
 mod rotations;
 mod tree;
 
@@ -11,6 +12,7 @@ use nalgebra::{Matrix2, Matrix3, Rotation3, UnitComplex, UnitQuaternion, Vector2
 
 use crate::group::{Dense, Group, Se2, Se3};
 
+pub use best::{Start, optimize_from_best};
 pub use rotations::rotations_first;
 pub(crate) use tree::complete;
 pub use tree::spanning_tree;

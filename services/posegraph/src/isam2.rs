@@ -11,6 +11,7 @@
 
 mod eliminate;
 mod marginal;
+mod pool;
 mod relinearise;
 mod solve;
 mod tree;
@@ -31,8 +32,7 @@ use variables::Variables;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Isam2Config {
-    /// A pose is linearised anew once a number of its step is this large, metres or radians. 0.1 is
-    /// what the paper uses.
+    /// A pose is linearised anew once a number of its step is this large, metres or radians.
     pub relinearise_threshold: f64,
     /// A step is passed on to the poses that depend on it once one of its numbers changed by more
     /// than this since it was passed on last.
@@ -47,8 +47,8 @@ pub struct Isam2Config {
 impl Default for Isam2Config {
     fn default() -> Self {
         Self {
-            relinearise_threshold: 0.1,
-            propagate_threshold: 1e-3,
+            relinearise_threshold: 0.05,
+            propagate_threshold: 1e-4,
             work_limit: None,
         }
     }

@@ -4,7 +4,7 @@
 //! order; poses marked *late* come after all others. Amestoy, Davis, Duff, *An approximate minimum
 //! degree ordering algorithm* (1996), on a quotient graph in which every clique is an element from
 //! the start, as in Davis et al., *A column approximate minimum degree ordering algorithm* (2004).
-//! Ties go to the pose that came to its degree last, so the order depends on nothing but the input.
+//! Ties go to the pose that came to its degree first, so the order depends on nothing but the input.
 
 /// Sets of poses, one after another.
 #[derive(Debug, Clone, Default)]
@@ -57,7 +57,9 @@ pub(crate) struct MinimumDegree {
     /// Poses that one stands for, as a list: next, and the last of the list.
     next_alike: Vec<u32>,
     last_alike: Vec<u32>,
+    /// First and last pose of each degree.
     buckets: Vec<u32>,
+    bucket_ends: Vec<u32>,
     next: Vec<u32>,
     previous: Vec<u32>,
     pose_mark: Vec<u32>,
@@ -80,8 +82,7 @@ impl MinimumDegree {
         order.clear();
         let mut least = 0;
         for stage in [false, true] {
-            // Reversed: where all degrees are equal, the first pose goes first.
-            for i in (0..n).rev() {
+            for i in 0..n {
                 if self.count[i] > 0 && late(i) == stage {
                     self.insert(i as u32);
                     least = least.min(self.degree[i] as usize);
@@ -113,6 +114,7 @@ impl MinimumDegree {
         self.last_alike.clear();
         self.last_alike.extend(0..n as u32);
         refill(&mut self.buckets, n + 1, NONE);
+        refill(&mut self.bucket_ends, n + 1, NONE);
         for v in [&mut self.weight, &mut self.element_mark, &mut self.outside] {
             refill(v, m, 0);
         }
@@ -149,31 +151,29 @@ impl MinimumDegree {
         }
     }
 
+    /// Behind all others of its degree: along a chain every second pose goes first, then every second
+    /// of what is left, so that the tree of what depends on what is shallow.
     fn insert(&mut self, i: u32) {
-        let bucket = &mut self.buckets[self.degree[i as usize] as usize];
-        self.next[i as usize] = *bucket;
-        self.previous[i as usize] = NONE;
-        if *bucket != NONE {
-            self.previous[*bucket as usize] = i;
+        let degree = self.degree[i as usize] as usize;
+        let last = core::mem::replace(&mut self.bucket_ends[degree], i);
+        self.previous[i as usize] = last;
+        self.next[i as usize] = NONE;
+        match last {
+            NONE => self.buckets[degree] = i,
+            last => self.next[last as usize] = i,
         }
-        *bucket = i;
     }
 
     fn unlink(&mut self, i: u32) {
+        let degree = self.degree[i as usize] as usize;
         let (before, after) = (self.previous[i as usize], self.next[i as usize]);
         match before {
-            NONE => {
-                let bucket = &mut self.buckets[self.degree[i as usize] as usize];
-                // A late pose is in no bucket yet.
-                if *bucket != i {
-                    return;
-                }
-                *bucket = after;
-            }
+            NONE => self.buckets[degree] = after,
             before => self.next[before as usize] = after,
         }
-        if after != NONE {
-            self.previous[after as usize] = before;
+        match after {
+            NONE => self.bucket_ends[degree] = before,
+            after => self.previous[after as usize] = before,
         }
     }
 
@@ -281,8 +281,7 @@ impl MinimumDegree {
         self.merge_alike(late);
         let remaining = (n - order.len()) as u32;
         self.member_begin.push(self.member_lists.len());
-        for at in 0..members.len() {
-            let i = members[at];
+        for &i in &members {
             let k = i as usize;
             let count = self.count[k];
             if count == 0 {

@@ -41,15 +41,17 @@ pub(crate) struct Plan {
     first_frontal: Vec<u32>,
     next_frontal: Vec<u32>,
     frontals: Vec<u32>,
+    /// Zeros stored because of joining.
+    zeros: Vec<usize>,
     is_joined: Vec<bool>,
     mark: Vec<u32>,
 }
 
-/// A clique joins its parent if the zeros this stores are at most this share of the joined columns,
-const ZEROS_SHARE: f64 = 0.1;
-/// or if the joined clique has no more poses than this to eliminate and
+/// A clique joins its parent if zeros are at most this share of what its columns then hold,
+const ZEROS_SHARE: f64 = 0.05;
+/// or, where the joined clique has no more poses than this to eliminate,
 const SMALL: usize = 4;
-/// its zeros are at most this share: fewer, larger cliques have less overhead.
+/// at most this: fewer, larger cliques have less overhead.
 const SMALL_ZEROS_SHARE: f64 = 0.35;
 
 impl Plan {
@@ -84,6 +86,7 @@ impl Plan {
         self.is_joined.resize(n, false);
         self.first_frontal.clear();
         self.frontals.clear();
+        self.zeros.clear();
         self.depends.clear();
         self.dependencies.clear();
         for (place, &i) in order.iter().enumerate() {
@@ -131,6 +134,7 @@ impl Plan {
         self.depends.push((begin, end));
         self.first_frontal.push(mark);
         self.frontals.push(1);
+        self.zeros.push(0);
         if begin < end {
             let parent = self.dependencies[begin] as usize;
             self.next_child[j] = core::mem::replace(&mut self.first_child[parent], mark);
@@ -147,9 +151,11 @@ impl Plan {
             let separator = self.depends[c].1 - self.depends[c].0;
             let zeros = theirs * (frontals + own - separator);
             let joined = theirs + frontals;
-            let stored = joined * (joined + own) - joined * (joined - 1) / 2;
+            let zeros = self.zeros[c] + zeros;
+            let stored = theirs * (theirs + 1) / 2 + theirs * (frontals + own);
             let share = zeros as f64 / stored as f64;
             if share <= ZEROS_SHARE || (joined <= SMALL && share <= SMALL_ZEROS_SHARE) {
+                self.zeros[j] += zeros;
                 // The child's poses come first.
                 self.next_frontal[c] = self.first_frontal[j];
                 self.first_frontal[j] = self.first_frontal[c];

@@ -1,6 +1,7 @@
 //! Numbers into planned cliques: assemble a front, eliminate its frontal poses, keep the rest.
 
 use super::Isam2;
+use super::tree::Clique;
 use crate::dense;
 use crate::group::{Dense, Group};
 use crate::symbolic::NONE;
@@ -22,6 +23,15 @@ pub(crate) struct Front {
     least: Vec<f64>,
     /// For each pose of the clique at hand: the row at which its block begins.
     row: Vec<u32>,
+    runs: Vec<Run>,
+}
+
+/// Rows of a child that are neighbours in its parent too.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    from: usize,
+    row: usize,
+    len: usize,
 }
 
 impl Front {
@@ -34,16 +44,15 @@ impl Front {
         column: usize,
         block: &[f64],
         dim: usize,
-        stride: usize,
     ) {
         for c in 0..dim {
             let begin = (column + c) * rows + row;
             let target = &mut self.numbers[begin..begin + dim];
             for (r, t) in target.iter_mut().enumerate() {
                 *t += if TRANSPOSED {
-                    block[r * stride + c]
+                    block[r * dim + c]
                 } else {
-                    block[c * stride + r]
+                    block[c * dim + r]
                 };
             }
         }
@@ -112,12 +121,15 @@ fn assemble<G: Group>(isam: &mut Isam2<G>, slot: u32, planned: usize) {
         work,
         ..
     } = isam;
-    let clique = &tree.cliques[slot as usize];
-    let columns = clique.variables.len() * G::DIM;
+    let columns = tree.cliques[slot as usize].variables.len() * G::DIM;
     let rows = columns + 1;
     let front = &mut work.front;
-    front.numbers.clear();
-    front.numbers.resize(rows * columns, 0.0);
+    tree.pool.give(core::mem::take(&mut front.numbers));
+    front.numbers = tree.pool.take(rows * columns);
+    for c in 0..columns {
+        front.numbers[c * rows + c..(c + 1) * rows].fill(0.0);
+    }
+    let clique = &tree.cliques[slot as usize];
     front.row.resize(variables.len(), 0);
     front.least.clear();
     for (k, &pose) in clique.variables.iter().enumerate() {
@@ -145,12 +157,12 @@ fn assemble<G: Group>(isam: &mut Isam2<G>, slot: u32, planned: usize) {
             let point = |i: u32| &variables.points[i as usize];
             let linear = bound.factor.linearize(point(bound.from), point(bound.to));
             let to = front.row[bound.to as usize] as usize;
-            front.add::<false>(rows, to, to, linear.to_to.numbers(), G::DIM, G::DIM);
+            front.add::<false>(rows, to, to, linear.to_to.numbers(), G::DIM);
             front.add_right(rows, to, linear.to_gradient.numbers().iter().map(|g| -g));
             if binary {
                 let from = front.row[bound.from as usize] as usize;
                 let numbers = linear.from_from.numbers();
-                front.add::<false>(rows, from, from, numbers, G::DIM, G::DIM);
+                front.add::<false>(rows, from, from, numbers, G::DIM);
                 front.add_right(
                     rows,
                     from,
@@ -158,9 +170,9 @@ fn assemble<G: Group>(isam: &mut Isam2<G>, slot: u32, planned: usize) {
                 );
                 let numbers = linear.from_to.numbers();
                 if from > to {
-                    front.add::<false>(rows, from, to, numbers, G::DIM, G::DIM);
+                    front.add::<false>(rows, from, to, numbers, G::DIM);
                 } else {
-                    front.add::<true>(rows, to, from, numbers, G::DIM, G::DIM);
+                    front.add::<true>(rows, to, from, numbers, G::DIM);
                 }
             }
         }
@@ -183,26 +195,49 @@ fn assemble<G: Group>(isam: &mut Isam2<G>, slot: u32, planned: usize) {
 }
 
 /// Adds what a child left to its separator.
-fn extend_add<G: Group>(front: &mut Front, rows: usize, child: &super::tree::Clique) {
+fn extend_add<G: Group>(front: &mut Front, rows: usize, child: &Clique) {
     let d = G::DIM;
-    let frontal = child.frontals as usize * d;
-    let theirs = child.variables.len() * d + 1;
-    let left = &child.numbers[frontal * theirs..];
-    let separator = child.separator();
-    let stride = separator.len() * d + 1;
-    for (c, &pose) in separator.iter().enumerate() {
-        let column = front.row[pose as usize] as usize;
-        for (r, &below) in separator.iter().enumerate().skip(c) {
-            let row = front.row[below as usize] as usize;
-            let block = &left[c * d * stride + r * d..];
-            if row >= column {
-                front.add::<false>(rows, row, column, block, d, stride);
-            } else {
-                front.add::<true>(rows, column, row, block, d, stride);
+    let first = child.frontals as usize;
+    let stride = child.variables.len() * d + 1;
+    // Most of a separator stands in the same order in the parent: whole stretches are added.
+    front.runs.clear();
+    for (k, pose) in child.variables.iter().enumerate().skip(first) {
+        let row = front.row[*pose as usize] as usize;
+        match front.runs.last_mut() {
+            Some(run) if run.row + run.len == row => run.len += d,
+            _ => front.runs.push(Run {
+                from: k * d,
+                row,
+                len: d,
+            }),
+        }
+    }
+    let Front { numbers, runs, .. } = front;
+    for (k, own) in runs.iter().enumerate() {
+        for c in 0..own.len {
+            let column = &child.numbers[(own.from + c) * stride..(own.from + c + 1) * stride];
+            let at = own.row + c;
+            let target = &mut numbers[at * rows..(at + 1) * rows];
+            add(&mut target[at..own.row + own.len], &column[own.from + c..]);
+            target[rows - 1] += column[stride - 1];
+            for run in &runs[k + 1..] {
+                let source = &column[run.from..run.from + run.len];
+                if run.row > at {
+                    add(&mut numbers[at * rows + run.row..][..run.len], source);
+                } else {
+                    for (r, v) in source.iter().enumerate() {
+                        numbers[(run.row + r) * rows + at] += v;
+                    }
+                }
             }
         }
-        let right = (0..d).map(|k| left[(c * d + k) * stride + stride - 1]);
-        front.add_right(rows, column, right);
+    }
+}
+
+#[inline(always)]
+fn add(target: &mut [f64], source: &[f64]) {
+    for (t, s) in target.iter_mut().zip(source) {
+        *t += s;
     }
 }
 
@@ -247,17 +282,6 @@ fn eliminate<G: Group>(isam: &mut Isam2<G>, slot: u32) -> Result<(), Weak> {
             finite: false,
         });
     }
-    let left = columns - pivots;
-    clique
-        .numbers
-        .reserve_exact(pivots * rows + left * (left + 1));
-    clique
-        .numbers
-        .extend_from_slice(&front.numbers[..pivots * rows]);
-    for c in pivots..columns {
-        clique
-            .numbers
-            .extend_from_slice(&front.numbers[c * rows + pivots..(c + 1) * rows]);
-    }
+    clique.numbers = core::mem::take(&mut front.numbers);
     Ok(())
 }

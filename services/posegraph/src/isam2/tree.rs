@@ -1,5 +1,6 @@
 //! The Bayes tree: cliques in slots, linked by index.
 
+use super::pool::Pool;
 use crate::symbolic::NONE;
 
 /// Poses that are eliminated together (frontal), given those they depend on (separator).
@@ -11,8 +12,9 @@ pub(crate) struct Clique {
     /// How many of `variables` are frontal; they come first.
     pub frontals: u32,
     pub variables: Vec<u32>,
-    /// Columns of the frontal poses, each with a row for every number of all poses and one for the
-    /// right-hand side; then the columns of what is left to the separator, likewise.
+    /// A column for every number of every pose, each with a row for every number and one for the
+    /// right-hand side. Those of frontal poses are Cholesky's factor, those of the separator what is
+    /// left to it. Only the lower triangle means anything.
     pub numbers: Vec<f64>,
     /// The pass since which steps of its separator were not passed on to it; 0 if they were.
     pub waiting_since: u32,
@@ -36,13 +38,11 @@ impl Clique {
 pub(crate) struct Tree {
     pub cliques: Vec<Clique>,
     free: Vec<u32>,
+    pub pool: Pool,
 }
 
-/// A slot's buffer that is so many times too large is given back.
-const SPARE: usize = 4;
-
 impl Tree {
-    /// A fresh clique without poses; its buffers are those of one that is gone.
+    /// A fresh clique without poses.
     pub fn add(&mut self) -> u32 {
         if let Some(slot) = self.free.pop() {
             self.cliques[slot as usize].is_fresh = true;
@@ -65,23 +65,15 @@ impl Tree {
     /// Frees a slot.
     pub fn remove(&mut self, slot: u32) {
         let clique = &mut self.cliques[slot as usize];
-        let used = clique.numbers.len();
-        if clique.numbers.capacity() > SPARE * used {
-            clique.numbers.shrink_to(used);
-        }
-        *clique = Clique {
-            parent: NONE,
-            first_child: NONE,
-            next_sibling: NONE,
-            frontals: 0,
-            variables: core::mem::take(&mut clique.variables),
-            numbers: core::mem::take(&mut clique.numbers),
-            waiting_since: 0,
-            is_fresh: false,
-            is_marked: false,
-        };
+        self.pool.give(core::mem::take(&mut clique.numbers));
         clique.variables.clear();
-        clique.numbers.clear();
+        clique.frontals = 0;
+        clique.parent = NONE;
+        clique.first_child = NONE;
+        clique.next_sibling = NONE;
+        clique.waiting_since = 0;
+        clique.is_fresh = false;
+        clique.is_marked = false;
         self.free.push(slot);
     }
 

@@ -115,7 +115,7 @@ pub(super) fn run<G: Group>(
     let waiting = relinearise::choose(isam, &limits, &taken_poses(&taken));
     relinearise::move_points(isam);
     gather(isam, poses_before);
-    order(isam, poses_before, &factor_ids);
+    order(isam, &factor_ids);
     let outcome = eliminate::run(isam);
     release_local(isam);
     if let Err(weak) = outcome {
@@ -354,7 +354,7 @@ fn release_local<G: Group>(isam: &mut Isam2<G>) {
 }
 
 /// Orders the affected poses, those of new factors last, and plans their cliques.
-fn order<G: Group>(isam: &mut Isam2<G>, _poses_before: usize, new: &[FactorId]) {
+fn order<G: Group>(isam: &mut Isam2<G>, new: &[FactorId]) {
     let work = &mut isam.work;
     work.late.clear();
     work.late.resize(work.affected.len(), false);
