@@ -91,7 +91,7 @@ mod tests {
             let exact = f64::from(y).atan2(f64::from(x)) / std::f64::consts::TAU;
             let exact = if exact < 0.0 { exact + 1.0 } else { exact };
             let error = (f64::from(turn(y, x)) - exact).abs();
-            assert!(error < 2e-7 || error > 1.0 - 2e-7, "{angle}: {error}");
+            assert!(!(2e-7..=1.0 - 2e-7).contains(&error), "{angle}: {error}");
         }
         assert_eq!(turn(0.0, 0.0), 0.0);
         assert_eq!(turn(-0.0, 1.0), 0.0);
