@@ -8,8 +8,9 @@
 use std::collections::HashMap;
 
 use crate::comparison::{Aligner, Comparison, Features, ShiftSearch};
-use crate::descriptor::{Descriptor, Layout};
+use crate::descriptor::{Descriptor, Kind, Layout};
 use crate::key_tree::{KeyForest, Near};
+use crate::ring_key::RingKey;
 
 /// How places are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +31,34 @@ impl Default for SearchConfig {
             candidates: 50,
             shifts: ShiftSearch::default(),
             min_similarity: 0.4,
+        }
+    }
+}
+
+/// What a database is for its life, and how places are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct DatabaseConfig {
+    /// How two descriptors are compared.
+    pub comparison: Comparison,
+    /// What places are first looked up by.
+    pub ring_key: RingKey,
+    /// How they are looked for; may change later.
+    pub search: SearchConfig,
+}
+
+impl DatabaseConfig {
+    /// What suits a kind: Scan Context as published, with occupancy keys and the plain cosine; the
+    /// Gaussian kinds with what was measured to work best.
+    pub fn for_kind(kind: Kind) -> Self {
+        match kind {
+            Kind::ScanContext => Self {
+                comparison: Comparison::Frobenius,
+                ring_key: RingKey::Occupancy,
+                ..Self::default()
+            },
+            Kind::GscHeight | Kind::GscHuber | Kind::GscIntensity => Self::default(),
         }
     }
 }
@@ -79,8 +108,7 @@ pub(crate) struct Place {
 /// Places that can be recognised.
 #[derive(Debug, Clone, Default)]
 pub struct Database {
-    pub(crate) config: SearchConfig,
-    pub(crate) comparison: Comparison,
+    pub(crate) config: DatabaseConfig,
     /// Given, or the first descriptor's.
     pub(crate) layout: Option<Layout>,
     pub(crate) keys: KeyForest,
@@ -91,20 +119,19 @@ pub struct Database {
 
 impl Database {
     /// An empty database, which takes the layout of its first descriptor.
-    pub fn new(comparison: Comparison, config: SearchConfig) -> Self {
+    pub fn new(config: DatabaseConfig) -> Self {
         Self {
             config,
-            comparison,
             ..Self::default()
         }
     }
 
     /// An empty database for descriptors of one layout.
-    pub fn with_layout(layout: Layout, comparison: Comparison, config: SearchConfig) -> Self {
+    pub fn with_layout(layout: Layout, config: DatabaseConfig) -> Self {
         Self {
+            keys: KeyForest::new(config.ring_key.dimensions(layout.profile.rings())),
             layout: Some(layout),
-            keys: KeyForest::new(layout.profile.rings()),
-            ..Self::new(comparison, config)
+            ..Self::new(config)
         }
     }
 
@@ -113,14 +140,14 @@ impl Database {
         self.layout.as_ref()
     }
 
-    /// How descriptors are compared.
-    pub fn comparison(&self) -> Comparison {
-        self.comparison
+    /// Its configuration.
+    pub fn config(&self) -> &DatabaseConfig {
+        &self.config
     }
 
-    /// How places are looked for; may change at any time.
-    pub fn search_config_mut(&mut self) -> &mut SearchConfig {
-        &mut self.config
+    /// Changes how places are looked for.
+    pub fn set_search(&mut self, search: SearchConfig) {
+        self.config.search = search;
     }
 
     /// How many places there are.
@@ -151,14 +178,19 @@ impl Database {
     pub fn insert(&mut self, id: u64, descriptor: &Descriptor) -> Result<(), LayoutMismatch> {
         self.check(descriptor)?;
         let mut features = Features::default();
-        Features::of(descriptor, self.comparison, &mut features);
+        Features::of(descriptor, self.config.comparison, &mut features);
         if self.layout.is_none() {
             self.layout = Some(descriptor.layout);
-            self.keys = KeyForest::new(descriptor.layout.profile.rings());
+            self.keys = self.no_keys();
         }
         self.remove(id);
-        self.append(id, features, &descriptor.ring_key());
+        self.append(id, features, &self.config.ring_key.of(descriptor));
         Ok(())
+    }
+
+    fn no_keys(&self) -> KeyForest {
+        let rings = self.layout.map_or(0, |layout| layout.profile.rings());
+        KeyForest::new(self.config.ring_key.dimensions(rings))
     }
 
     pub(crate) fn append(&mut self, id: u64, features: Features, key: &[u16]) {
@@ -186,9 +218,7 @@ impl Database {
     fn close_holes(&mut self) {
         let keys = std::mem::take(&mut self.keys);
         let places = std::mem::take(&mut self.places);
-        if let Some(layout) = self.layout {
-            self.keys = KeyForest::new(layout.profile.rings());
-        }
+        self.keys = self.no_keys();
         for (slot, place) in places.into_iter().enumerate() {
             if let Some(Place { id, features }) = place {
                 self.append(id, features, keys.key(slot));
@@ -218,16 +248,17 @@ impl Database {
             return Ok(());
         };
         views.iter().try_for_each(|view| self.check(view))?;
+        let config = &self.config;
         let mut aligner = Aligner::default();
         let mut features = Features::default();
         let mut near = Vec::new();
         let mut compared: Vec<(u32, Match)> = Vec::new();
         for view in views {
-            Features::of(view, self.comparison, &mut features);
+            Features::of(view, config.comparison, &mut features);
             if features.is_empty() {
                 continue;
             }
-            self.nearest_keys(&view.ring_key(), &accept, &mut near);
+            self.nearest_keys(&config.ring_key.of(view), &accept, &mut near);
             for &Near { slot, .. } in &near {
                 let Some(place) = &self.places[slot as usize] else {
                     continue;
@@ -235,13 +266,13 @@ impl Database {
                 let aligned = aligner.align(
                     &features,
                     &place.features,
-                    self.comparison,
-                    self.config.shifts,
+                    config.comparison,
+                    config.search.shifts,
                 );
                 let Some(aligned) = aligned else {
                     continue;
                 };
-                if aligned.similarity > self.config.min_similarity {
+                if aligned.similarity > config.search.min_similarity {
                     let found = Match {
                         id: place.id,
                         similarity: aligned.similarity,
@@ -269,7 +300,8 @@ impl Database {
             let place = self.places[slot as usize].as_ref();
             place.is_some_and(|place| !place.features.is_empty() && accept(place.id))
         };
-        self.keys.nearest(key, self.config.candidates, taken, near);
+        self.keys
+            .nearest(key, self.config.search.candidates, taken, near);
     }
 
     fn check(&self, descriptor: &Descriptor) -> Result<(), LayoutMismatch> {

@@ -8,8 +8,9 @@ use std::collections::HashSet;
 
 use crate::bytes::{Reader, Unreadable, Writer};
 use crate::comparison::{Comparison, Features, ShiftSearch};
-use crate::database::{Database, SearchConfig};
+use crate::database::{Database, DatabaseConfig, SearchConfig};
 use crate::descriptor::Layout;
+use crate::ring_key::{GREATEST, RingKey};
 
 /// First bytes; the last one is the version.
 const MAGIC: &[u8; 4] = b"HPB1";
@@ -20,8 +21,9 @@ impl Database {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Writer::default();
         out.bytes(MAGIC);
-        out.u8(self.comparison.code());
-        self.config.write(&mut out);
+        out.u8(self.config.comparison.code());
+        out.u8(self.config.ring_key.code());
+        self.config.search.write(&mut out);
         out.u8(u8::from(self.layout.is_some()));
         let Some(layout) = &self.layout else {
             return out.into_bytes();
@@ -45,41 +47,37 @@ impl Database {
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Unreadable> {
         let mut bytes = Reader::new(bytes);
         bytes.magic(MAGIC, "a place database")?;
-        let code = bytes.u8()?;
-        let comparison = Comparison::from_code(code).ok_or(Unreadable::Code {
-            name: "comparison",
-            got: code,
-        })?;
-        let config = SearchConfig::read(&mut bytes)?;
+        let (comparison, ring_key) = (bytes.u8()?, bytes.u8()?);
+        let unknown = |name, got| Unreadable::Code { name, got };
+        let config = DatabaseConfig {
+            comparison: Comparison::from_code(comparison)
+                .ok_or(unknown("comparison", comparison))?,
+            ring_key: RingKey::from_code(ring_key).ok_or(unknown("ring key", ring_key))?,
+            search: SearchConfig::read(&mut bytes)?,
+        };
         match bytes.u8()? {
             0 => {
                 bytes.end()?;
-                return Ok(Self::new(comparison, config));
+                return Ok(Self::new(config));
             }
             1 => {}
-            got => {
-                return Err(Unreadable::Code {
-                    name: "whether it has a layout",
-                    got,
-                });
-            }
+            got => return Err(unknown("whether it has a layout", got)),
         }
         let layout = Layout::read(&mut bytes)?;
-        let mut database = Self::with_layout(layout, comparison, config);
+        let mut database = Self::with_layout(layout, config);
         let (rings, bins) = (layout.profile.rings(), layout.profile.bins());
+        let dimensions = config.ring_key.dimensions(rings);
         let count = bytes.u32()? as usize;
-        bytes.expect(count.saturating_mul(8 + 2 * rings + 2 * bins))?;
+        bytes.expect(count.saturating_mul(8 + 2 * dimensions + 2 * bins))?;
         let mut ids = HashSet::with_capacity(count);
         for _ in 0..count {
             let id = bytes.u64()?;
             if !ids.insert(id) {
                 return Err(Unreadable::Twice(id));
             }
-            let key: Vec<u16> = (0..rings).map(|_| bytes.u16()).collect::<Result<_, _>>()?;
-            if key
-                .iter()
-                .any(|k| usize::from(*k) > layout.profile.sectors())
-            {
+            let key = (0..dimensions).map(|_| bytes.u16());
+            let key: Vec<u16> = key.collect::<Result<_, _>>()?;
+            if key.iter().any(|k| *k > GREATEST) {
                 return Err(Unreadable::Number { name: "a ring key" });
             }
             let values = (0..bins).map(|_| bytes.i16()).collect::<Result<_, _>>()?;

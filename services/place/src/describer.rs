@@ -27,16 +27,34 @@ pub struct DescriberConfig {
     pub delta_m: f32,
     /// Bins with fewer points are empty.
     pub min_points: u32,
+    /// Bins with fewer points than this share of the mean over all bins are empty.
+    pub min_share: f32,
 }
 
 impl Default for DescriberConfig {
     fn default() -> Self {
+        Self::for_kind(Kind::default())
+    }
+}
+
+impl DescriberConfig {
+    /// What suits a kind.
+    ///
+    /// The Gaussian kinds leave bins with fewer than five points empty, or fewer than a fifth of
+    /// the mean: four points have no distribution to speak of, and stray returns, which fall into
+    /// all bins alike, seldom come in fives. Scan Context takes every return, as published.
+    pub fn for_kind(kind: Kind) -> Self {
+        let (min_points, min_share) = match kind {
+            Kind::ScanContext => (1, 0.0),
+            Kind::GscHeight | Kind::GscHuber | Kind::GscIntensity => (5, 0.2),
+        };
         Self {
-            kind: Kind::default(),
+            kind,
             formula: Formula::default(),
             alpha: 2.0,
             delta_m: 1.0,
-            min_points: 1,
+            min_points,
+            min_share,
         }
     }
 }
@@ -46,6 +64,9 @@ impl Default for DescriberConfig {
 const LOWEST_SHARE: f32 = 0.1;
 /// Greatest intensity: 16 bits, what sensors with more than 8 give.
 const MAX_INTENSITY: f32 = 65_535.0;
+
+/// Greatest value of a bin, whatever the configuration: squares of values stay finite.
+const GREATEST: f32 = 1e12;
 
 /// Sums over the points of one bin.
 #[derive(Debug, Clone, Copy, Default)]
@@ -145,6 +166,14 @@ impl Describer {
         }
     }
 
+    /// How many points a bin needs not to be empty.
+    fn enough(&self) -> u32 {
+        let inside = self.bins.iter().filter(|bin| **bin != OUTSIDE).count();
+        let mean = inside as f32 / self.profile.bins() as f32;
+        let share = (self.config.min_share * mean).ceil() as u32; // saturates; NaN is 0
+        self.config.min_points.max(share).max(1)
+    }
+
     /// A height within what a bin can hold.
     #[inline(always)]
     fn height(&self, z: f32) -> f32 {
@@ -164,8 +193,9 @@ impl Describer {
                 self.greatest[bin] = self.greatest[bin].max(point[2]);
             }
         }
+        let enough = self.enough();
         for ((out, &count), &z) in out.iter_mut().zip(&self.counts).zip(&self.greatest) {
-            if count >= self.config.min_points.max(1) {
+            if count >= enough {
                 *out = self.height(z) + self.profile.ground_offset_m();
             }
         }
@@ -223,7 +253,7 @@ impl Describer {
         } else {
             (0.0, f32::MIN_POSITIVE)
         };
-        let enough = f64::from(self.config.min_points.max(1));
+        let enough = f64::from(self.enough());
         for ((out, sums), plain) in out.iter_mut().zip(sums).zip(&self.sums) {
             if plain.weight < enough {
                 continue;
@@ -239,7 +269,8 @@ impl Describer {
                 Formula::Variance => variance,
                 Formula::Deviation => variance.sqrt(),
             };
-            *out = ((mean + f64::from(self.config.alpha) * spread) as f32 + offset).max(least);
+            let value = (mean + f64::from(self.config.alpha) * spread) as f32 + offset;
+            *out = value.max(least).min(GREATEST); // NaN, of a hostile alpha, is the least
         }
     }
 }

@@ -50,11 +50,13 @@ pub mod leveller;
 mod polar;
 pub mod precision_recall;
 pub mod profile;
+mod ring_key;
 
 pub use bytes::Unreadable;
 pub use comparison::{Comparison, ShiftSearch};
-pub use database::{Database, LayoutMismatch, Match, SearchConfig};
+pub use database::{Database, DatabaseConfig, LayoutMismatch, Match, SearchConfig};
 pub use describer::{Describer, DescriberConfig};
 pub use descriptor::{Descriptor, Formula, Kind, Layout};
 pub use leveller::{Ground, Levelled, Leveller};
 pub use profile::{Profile, ProfileError};
+pub use ring_key::RingKey;

@@ -31,10 +31,11 @@ pub(crate) fn bins(profile: &Profile, points: &[[f32; 4]], lateral_m: f32, out: 
     }));
 }
 
-/// The least whole number not below a number of moderate size.
+/// The least whole number not below a number; more than any grid has for large ones and NaN.
 #[inline(always)]
 fn ceil(value: f32) -> i32 {
     // `f32::ceil` is a function call on processors before SSE 4.1.
+    let value = value.min(65_536.0);
     let whole = value as i32;
     whole + i32::from(value > whole as f32)
 }

@@ -4,7 +4,7 @@
 //! among the earlier ones. Out: the curve over the threshold, the area under it, the recall at full
 //! precision.
 //!
-//! For keyframe `n` the last `exclude` ones are left out. A *detection* is a match more alike than
+//! Keyframe `n` may be matched with the keyframes up to `n - exclude`. A *detection* is a match more alike than
 //! the threshold; it is right if the two lie within the radius of each other. A detection that is
 //! right is a true positive, another a false positive; no detection where some earlier keyframe
 //! lies within the radius is a false negative, no detection elsewhere a true negative.
@@ -67,15 +67,20 @@ fn share(part: usize, whole: usize) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
 }
 
-/// Which keyframes are revisits: an earlier one lies within `radius_m`, the last `exclude` left
-/// out: keyframe `n` has the candidates `0..n - exclude`.
+/// Whether keyframe `n` may be matched with keyframe `earlier`: it is at least `exclude` keyframes
+/// before it, and before it at all.
+pub fn may_match(n: usize, earlier: usize, exclude: usize) -> bool {
+    earlier < n && earlier.saturating_add(exclude) <= n
+}
+
+/// Which keyframes are revisits: one that it [may match](may_match) lies within `radius_m`.
 pub fn revisits(positions: &[[f64; 3]], exclude: usize, radius_m: f64) -> Vec<bool> {
     positions
         .iter()
         .enumerate()
         .map(|(n, position)| {
-            let earlier = &positions[..n.saturating_sub(exclude)];
-            earlier.iter().any(|e| distance_m(e, position) <= radius_m)
+            let mut earlier = positions[..n].iter().enumerate();
+            earlier.any(|(j, e)| may_match(n, j, exclude) && distance_m(e, position) <= radius_m)
         })
         .collect()
 }

@@ -36,12 +36,12 @@ pub struct EvalLoopsArguments {
     /// Grid: for the surroundings that the first scans show, or given.
     #[arg(long, value_enum, default_value_t = ProfileArgument::Auto)]
     pub profile: ProfileArgument,
-    /// How a bin's mean and spread make one value.
+    /// How a bin's mean and spread make one value (of no matter to sc).
     #[arg(long, value_enum, default_value_t = FormulaArgument::Deviation)]
     pub formula: FormulaArgument,
-    /// How two descriptors are compared.
-    #[arg(long, value_enum, default_value_t = ComparisonArgument::Centred)]
-    pub comparison: ComparisonArgument,
+    /// How two descriptors are compared [default: frobenius for sc, centred for the others].
+    #[arg(long, value_enum)]
+    pub comparison: Option<ComparisonArgument>,
     /// Draw precision over recall to this SVG file.
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 
 use hachi_bridge::ScanFiles;
 use hachi_hal::{Point, Pose, Stamp};
-use hachi_place::precision_recall::{Curve, Detection, Outcome, distance_m, revisits};
+use hachi_place::precision_recall::{Curve, Detection, Outcome, distance_m, may_match, revisits};
 use hachi_place::{
-    Comparison, Database, Describer, DescriberConfig, Descriptor, Ground, Leveller, Match, Profile,
-    SearchConfig, leveller,
+    Database, DatabaseConfig, Describer, DescriberConfig, Descriptor, Ground, Leveller, Match,
+    Profile, leveller,
 };
 use hachi_trajectory::{Trajectory, read};
 use serde::Serialize;
@@ -176,18 +176,19 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(arguments: &'a EvalLoopsArguments) -> Self {
-        let config = SearchConfig {
-            // Every threshold is looked at afterwards.
-            min_similarity: f32::MIN,
-            ..SearchConfig::default()
-        };
+        let mut config = DatabaseConfig::for_kind(arguments.descriptor.into());
+        if let Some(comparison) = arguments.comparison {
+            config.comparison = comparison.into();
+        }
+        // Every threshold is looked at afterwards.
+        config.search.min_similarity = f32::MIN;
         Self {
             arguments,
             leveller: Leveller::default(),
             level_from_sensor: None,
             held: Vec::new(),
             describer: None,
-            database: Database::new(Comparison::from(arguments.comparison), config),
+            database: Database::new(config),
             views: Vec::new(),
             matches: Vec::new(),
             positions: Vec::new(),
@@ -241,9 +242,8 @@ impl<'a> Run<'a> {
             .profile()
             .unwrap_or_else(|| Profile::for_clouds(held.iter().map(Vec::as_slice)));
         let config = DescriberConfig {
-            kind: self.arguments.descriptor.into(),
             formula: self.arguments.formula.into(),
-            ..DescriberConfig::default()
+            ..DescriberConfig::for_kind(self.arguments.descriptor.into())
         };
         self.describer = Some(Describer::new(profile, config));
         held.iter()
@@ -258,7 +258,7 @@ impl<'a> Run<'a> {
         let start = Instant::now();
         describer.describe_views(levelled, &mut self.views);
         let described = Instant::now();
-        let accept = |earlier| earlier + (self.arguments.exclude as u64) < id;
+        let accept = |earlier| may_match(id as usize, earlier as usize, self.arguments.exclude);
         self.database
             .query(&self.views, accept, 1, &mut self.matches)
             .and_then(|()| self.database.insert(id, &self.views[0]))

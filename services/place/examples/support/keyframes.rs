@@ -1,7 +1,8 @@
-//! Keyframes of a simulated robot that walks through a building: what it measured, and where.
+//! Keyframes of a simulated robot: what it measured, and where.
 //!
-//! A patrol is walked three times: as it is; 0.4 m to the left, with the sensor turned by 50
-//! degrees; 0.4 m to the right, in reverse direction. Each keyframe is a few turns of a VLP-16
+//! The small buildings are patrolled three times: as it comes; 0.4 m to the left, with the sensor
+//! turned by 50 degrees; 0.3 m to the right and in reverse direction. The large ones bring the robot
+//! back to known places in both directions by themselves. Each keyframe is a few turns of a VLP-16
 //! gathered with the true motion between them, as odometry over a second would do it, and levelled
 //! by the library itself.
 
@@ -55,8 +56,7 @@ pub struct Keyframe {
     pub points: Vec<[f32; 4]>,
 }
 
-/// Gap between keyframes, metres or radians.
-const GAP_M: f64 = 1.0;
+/// A turn in place makes a keyframe after this, radians.
 const GAP_RAD: f64 = 0.5;
 /// Turns in one keyframe, and the time between them, seconds.
 const TURNS: usize = 5;
@@ -76,16 +76,23 @@ pub fn walk(preset: Preset, seed: u64, level: Level) -> Vec<Keyframe> {
         ..NoiseConfig::default()
     };
     let mounted = config.base_from_lidar;
-    let rounds = [(0.0, 0.0), (0.4, 50f64.to_radians()), (-0.4, PI)];
+    let rounds: &[(f64, f64)] = match preset {
+        Preset::Building | Preset::Campus | Preset::CampusLong => &[(0.0, 0.0)],
+        _ => &[(0.0, 0.0), (0.4, 50.0 * PI / 180.0), (-0.3, PI)],
+    };
+    let gap_m = match preset {
+        Preset::Campus | Preset::CampusLong => 2.0,
+        _ => 1.0,
+    };
     let mut keyframes = Vec::new();
-    for (round, (lateral_m, yaw)) in rounds.into_iter().enumerate() {
+    for (round, &(lateral_m, yaw)) in rounds.iter().enumerate() {
         let aside = Pose::from_parts(
             hachi_hal::Vector3::new(0.0, lateral_m, 0.0).into(),
             Rotation::from_euler_angles(0.0, 0.0, yaw),
         );
         config.base_from_lidar = aside * mounted;
         config.seed = seed.wrapping_mul(1000) + round as u64;
-        let mut of_round = round_of(&config, round_s, round as f64 * 0.37, level);
+        let mut of_round = round_of(&config, round_s, round as f64 * 0.37, gap_m, level);
         if yaw == PI {
             of_round.reverse();
         }
@@ -98,6 +105,7 @@ fn round_of(
     config: &SimulationConfig,
     round_s: f64,
     begin_s: f64,
+    gap_m: f64,
     level: Level,
 ) -> Vec<Keyframe> {
     let mut simulation = Simulation::new(SimulationConfig {
@@ -116,7 +124,7 @@ fn round_of(
         let now = config.map_from_lidar(at(time_s));
         let moved = last.is_none_or(|last| {
             let between = last.inverse() * now;
-            between.translation.vector.norm() > GAP_M || between.rotation.angle() > GAP_RAD
+            between.translation.vector.norm() > gap_m || between.rotation.angle() > GAP_RAD
         });
         if moved {
             last = Some(now);
