@@ -130,7 +130,7 @@ fn recognise(
     let (mut views, mut matches, mut outcomes) = (Vec::new(), Vec::new(), Vec::new());
     for (n, keyframe) in keyframes.iter().enumerate() {
         describer.describe_views(&keyframe.points, &mut views);
-        let accept = |earlier| may_match(n, earlier as usize, EXCLUDE);
+        let accept = |earlier: u64| may_match(n, earlier as usize, EXCLUDE);
         database.query(&views, accept, 1, &mut matches)?;
         database.insert(n as u64, &views[0])?;
         outcomes.push(Outcome {

@@ -258,7 +258,8 @@ impl<'a> Run<'a> {
         let start = Instant::now();
         describer.describe_views(levelled, &mut self.views);
         let described = Instant::now();
-        let accept = |earlier| may_match(id as usize, earlier as usize, self.arguments.exclude);
+        let accept =
+            |earlier: u64| may_match(id as usize, earlier as usize, self.arguments.exclude);
         self.database
             .query(&self.views, accept, 1, &mut self.matches)
             .and_then(|()| self.database.insert(id, &self.views[0]))
