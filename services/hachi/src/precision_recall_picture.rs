@@ -37,7 +37,7 @@ impl Picture<'_> {
         Ok(svg)
     }
 
-    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn std::error::Error + '_>> {
+    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
         let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
         let (title, area) = root.split_vertically(TITLE_HEIGHT);
@@ -50,7 +50,7 @@ impl Picture<'_> {
             .margin(12)
             .set_label_area_size(LabelAreaPosition::Left, 64)
             .set_label_area_size(LabelAreaPosition::Bottom, 48)
-            .build_cartesian_2d(0.0..1.0, 0.0..1.02)?;
+            .build_cartesian_2d(0f64..1f64, 0f64..1.02f64)?;
         chart
             .configure_mesh()
             .x_desc("recall")

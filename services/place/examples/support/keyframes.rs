@@ -50,8 +50,6 @@ pub const LEVELS: [Level; 3] = [
 pub struct Keyframe {
     /// True position of the sensor in the map, metres.
     pub position: [f64; 3],
-    /// True heading of the sensor, radians.
-    pub heading_rad: f64,
     /// What it measured, levelled by the library.
     pub points: Vec<[f32; 4]>,
 }
@@ -139,10 +137,8 @@ fn round_of(config: &SimulationConfig, round_s: f64, begin_s: f64, level: Level)
             thin(&mut gathered);
             let mut points = Vec::new();
             leveller.level(&gathered, None, &mut points);
-            let heading = now.rotation * hachi_hal::Vector3::x();
             keyframes.push(Keyframe {
                 position: now.translation.vector.into(),
-                heading_rad: heading.y.atan2(heading.x),
                 points,
             });
         }
