@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use hachi_posegraph::batch::{self, Options};
 use hachi_posegraph::initialise::{self, Rigid};
-use hachi_posegraph::{Dense, Factor, Graph, Group, Isam2, Isam2Config, Se2, Se3, Square};
+use hachi_posegraph::{Dense, Factor, Graph, Isam2, Isam2Config, Se2, Se3, Square};
 
 /// Poses of one lap: a circle of 160 m radius at a metre a step.
 const LAP: u64 = 1_000;
@@ -100,7 +100,12 @@ impl<G: Rigid> Drive<G> {
             // The same place, any number of laps ago; recent laps more often, as in a patrol.
             let back = 1 + (laps as f64 * self.noise.uniform().powi(3)) as u64;
             let seen = G::identity().retract(&self.noise.step::<G>(METRES, RADIANS));
-            factors.push(Factor::loop_closure(k - back.min(laps) * LAP, k, seen, information));
+            factors.push(Factor::loop_closure(
+                k - back.min(laps) * LAP,
+                k,
+                seen,
+                information,
+            ));
         }
         factors
     }
@@ -136,7 +141,7 @@ fn run<G: Rigid>(what: &str, poses: u64, loops: u64) -> Result<(), Box<dyn Error
             let pose = match key {
                 0 => G::identity(),
                 _ => {
-                    let before = isam.estimate(key - 1).ok_or("the pose before is there")?;
+                    let before: G = isam.estimate(key - 1).ok_or("the pose before is there")?;
                     before.compose(factors[0].measured())
                 }
             };
@@ -145,7 +150,11 @@ fn run<G: Rigid>(what: &str, poses: u64, loops: u64) -> Result<(), Box<dyn Error
             ms.push(start.elapsed().as_secs_f64() * 1e3);
             if (key + 1) % (poses / 10).max(1) == 0 {
                 let seconds = begun.elapsed().as_secs_f64();
-                println!("isam2: {} poses, {seconds:.1} s, {}", key + 1, peak_memory());
+                println!(
+                    "isam2: {} poses, {seconds:.1} s, {}",
+                    key + 1,
+                    peak_memory()
+                );
                 begun = Instant::now();
             }
         }
@@ -171,5 +180,8 @@ fn run<G: Rigid>(what: &str, poses: u64, loops: u64) -> Result<(), Box<dyn Error
 fn peak_memory() -> String {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    peak.map_or_else(|| "peak memory unknown".to_owned(), |peak| format!("peak{peak}"))
+    peak.map_or_else(
+        || "peak memory unknown".to_owned(),
+        |peak| format!("peak{peak}"),
+    )
 }

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Noise, Walk, grid_walk};
 use hachi_posegraph::g2o::{Contents, Document, LineProblem, ReadError, read, write};
-use hachi_posegraph::{Dense, FactorKind, Graph, Group, Se2, Se3};
+use hachi_posegraph::{Dense, FactorKind, Graph, Se2, Se3};
 use nalgebra::{Matrix3, Matrix6};
 
 fn plane(text: &str) -> Contents<Se2> {
@@ -37,15 +37,24 @@ fn every_number_lands_in_its_place() {
     let edge = &contents.edges[0];
     assert_eq!((edge.from(), edge.to()), (3, 8));
     assert_eq!(edge.kind(), FactorKind::Loop);
-    let expected = Matrix3::new(
-        11.0, 12.0, 13.0, 12.0, 22.0, 23.0, 13.0, 23.0, 33.0,
-    );
+    let expected = Matrix3::new(11.0, 12.0, 13.0, 12.0, 22.0, 23.0, 13.0, 23.0, 33.0);
     assert_eq!(*edge.information(), expected);
-    assert_eq!((edge.measured().translation.x, edge.measured().translation.y), (1.0, 2.0));
+    assert_eq!(
+        (edge.measured().translation.x, edge.measured().translation.y),
+        (1.0, 2.0)
+    );
     assert!((edge.measured().theta() - 0.5).abs() < 1e-15);
 
     let upper: Vec<String> = (0..6)
-        .flat_map(|r| (r..6).map(move |c| if r == c { "9".to_owned() } else { format!("0.{r}{c}") }))
+        .flat_map(|r| {
+            (r..6).map(move |c| {
+                if r == c {
+                    "9".to_owned()
+                } else {
+                    format!("0.{r}{c}")
+                }
+            })
+        })
         .collect();
     let text = format!(
         "VERTEX_SE3:QUAT 7 1 2 3 0 0 0.6 0.8\nEDGE_SE3:QUAT 7 8 4 5 6 0.6 0 0 0.8 {}\n",
@@ -61,12 +70,17 @@ fn every_number_lands_in_its_place() {
     let edge = &contents.edges[0];
     assert_eq!(edge.kind(), FactorKind::Between);
     assert!((edge.measured().rotation.scaled_axis().x - angle).abs() < 1e-15);
-    assert_eq!((edge.information()[(0, 5)], edge.information()[(4, 3)]), (0.05, 0.34));
+    assert_eq!(
+        (edge.information()[(0, 5)], edge.information()[(4, 3)]),
+        (0.05, 0.34)
+    );
 }
 
 #[test]
 fn comments_crlf_blank_lines_and_a_missing_last_end_are_fine() {
-    let text = format!("# a graph\r\n\r\nVERTEX_SE2 0 0 0 0 # first\r\n\t VERTEX_SE2 1 1 0 0\r\nFIX 0\r\n{EDGE}");
+    let text = format!(
+        "# a graph\r\n\r\nVERTEX_SE2 0 0 0 0 # first\r\n\t VERTEX_SE2 1 1 0 0\r\nFIX 0\r\n{EDGE}"
+    );
     let contents = plane(&text);
     assert_eq!((contents.vertices.len(), contents.edges.len()), (2, 1));
     assert_eq!(contents.fixed, [0]);
@@ -89,7 +103,11 @@ fn what_is_mended_is_counted() {
     assert_eq!(repairs.unknown_fixed, 1);
     assert_eq!(repairs.loose_parts, 1);
     assert_eq!(repairs.clipped_information, 1);
-    let tags: Vec<_> = repairs.unknown_tags.iter().map(|(t, n)| (t.as_str(), *n)).collect();
+    let tags: Vec<_> = repairs
+        .unknown_tags
+        .iter()
+        .map(|(t, n)| (t.as_str(), *n))
+        .collect();
     assert_eq!(tags, [("PARAMS_SE2OFFSET", 1), ("VERTEX_XY", 2)]);
     // The first of two poses counts, both of two equal edges do.
     assert_eq!(graph.pose(0).unwrap().translation.x, 0.0);
@@ -102,7 +120,9 @@ fn what_is_mended_is_counted() {
 
 #[test]
 fn a_quaternion_that_is_not_of_length_one_is_scaled() {
-    let contents = space("VERTEX_SE3:QUAT 0 0 0 0 0 0 3 4\nVERTEX_SE3:QUAT 1 0 0 0 0 0 1e-200 0\nVERTEX_SE3:QUAT 2 0 0 0 0 0 1e200 0\nVERTEX_SE3:QUAT 3 0 0 0 0 0 0.7071068 0.7071068\n");
+    let contents = space(
+        "VERTEX_SE3:QUAT 0 0 0 0 0 0 3 4\nVERTEX_SE3:QUAT 1 0 0 0 0 0 1e-200 0\nVERTEX_SE3:QUAT 2 0 0 0 0 0 1e200 0\nVERTEX_SE3:QUAT 3 0 0 0 0 0 0.7071068 0.7071068\n",
+    );
     assert_eq!(contents.repairs.scaled_quaternions, 3);
     for (_, pose) in &contents.vertices {
         assert!((pose.rotation.norm() - 1.0).abs() < 1e-15);
@@ -112,7 +132,17 @@ fn a_quaternion_that_is_not_of_length_one_is_scaled() {
 #[test]
 fn a_line_that_can_not_be_understood_is_refused_by_its_number() {
     let count = refused(&format!("{EDGE}\nVERTEX_SE2 0 0 0\n"));
-    assert!(matches!(count, (2, LineProblem::Count { expected: 4, got: 3, .. })));
+    assert!(matches!(
+        count,
+        (
+            2,
+            LineProblem::Count {
+                expected: 4,
+                got: 3,
+                ..
+            }
+        )
+    ));
     assert!(matches!(
         refused("\n# x\nVERTEX_SE2 0 0 nan 0\n"),
         (3, LineProblem::NotFinite { .. })
@@ -143,12 +173,21 @@ fn a_line_that_can_not_be_understood_is_refused_by_its_number() {
     ));
     assert!(matches!(
         refused(&format!("{EDGE}\nVERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n")),
-        (2, LineProblem::OtherSpace { began: "EDGE_SE2", .. })
+        (
+            2,
+            LineProblem::OtherSpace {
+                began: "EDGE_SE2",
+                ..
+            }
+        )
     ));
     let long = format!("# {}\n", "x".repeat(100_000));
     assert!(matches!(refused(&long), (1, LineProblem::TooLong { .. })));
     for nothing in ["", "\n\n", "# nothing\nFIX 3\n", "\u{0}\u{1}\n"] {
-        assert!(matches!(read(nothing.as_bytes()), Err(ReadError::Empty { .. })));
+        assert!(matches!(
+            read(nothing.as_bytes()),
+            Err(ReadError::Empty { .. })
+        ));
     }
 }
 
@@ -157,7 +196,10 @@ fn many_unknown_tags_cost_no_memory() {
     let text: String = (0..10_000).map(|k| format!("TAG_{k} 1 2 3\n")).collect();
     let contents = plane(&(text + EDGE));
     assert_eq!(contents.repairs.unknown_tags.len(), 33);
-    assert_eq!(contents.repairs.unknown_tags.values().sum::<usize>(), 10_000);
+    assert_eq!(
+        contents.repairs.unknown_tags.values().sum::<usize>(),
+        10_000
+    );
 }
 
 #[test]
