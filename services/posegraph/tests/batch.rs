@@ -88,21 +88,6 @@ fn exact_measurements_give_back_the_truth() {
 }
 
 #[test]
-fn noise_leaves_half_a_chi_square_for_each_surplus_measurement() {
-    let mut graph = grid_walk::<Se3>(400, &mut Noise::new(33), Matrix6::identity() * 2500.0);
-    let surplus = 6 * (graph.factors().count() - graph.len());
-    let report = optimize(&mut graph, &Options::default()).unwrap();
-    let expected = 0.5 * surplus as f64;
-    // Five standard deviations of half a chi-square.
-    let spread = 5.0 * (0.5 * surplus as f64).sqrt();
-    assert!(surplus > 200);
-    assert!(
-        (report.final_error - expected).abs() < spread,
-        "{report:?} {expected}"
-    );
-}
-
-#[test]
 fn a_long_corridor_with_a_bad_compass_needs_rotations_first() {
     // Odometry turns by two degrees a step too much for 200 steps; loops at both ends know better.
     let step = Se2::new(1.0, 0.0, 0.0);
@@ -165,8 +150,6 @@ fn a_wrong_loop_bends_the_map_unless_its_kernel_lets_go() {
     ] {
         assert!(bent_by(kernel) < 1e-3, "{kernel:?}");
     }
-    assert!(bent_by(Kernel::Cauchy { scale: 2.4 }) < 0.1);
-    assert!(bent_by(Kernel::Huber { delta: 1.3 }) < bent_by(Kernel::Quadratic));
 }
 
 #[test]

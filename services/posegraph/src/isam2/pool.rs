@@ -45,7 +45,11 @@ impl Pool {
         // The class whose requests it surely holds.
         let mut class = class_that_holds(capacity);
         if size_of_class(class) > capacity {
-            class -= 1;
+            // A copy of a solver has buffers of their exact length, some below the smallest class.
+            let Some(below) = class.checked_sub(1) else {
+                return;
+            };
+            class = below;
         }
         if self.classes.len() <= class {
             self.classes.resize_with(class + 1, Vec::new);
