@@ -99,7 +99,13 @@ pub fn walk(preset: Preset, seed: u64, level: Level) -> Vec<Keyframe> {
     keyframes
 }
 
-fn round_of(config: &SimulationConfig, round_s: f64, begin_s: f64, level: Level) -> Vec<Keyframe> {
+fn round_of(
+    config: &SimulationConfig,
+    round_s: f64,
+    begin_s: f64,
+    gap_m: f64,
+    level: Level,
+) -> Vec<Keyframe> {
     let mut simulation = Simulation::new(SimulationConfig {
         scene: Arc::clone(&config.scene),
         trajectory: Arc::clone(&config.trajectory),
