@@ -326,6 +326,24 @@ fn ipv6_fragments_are_put_together() {
     assert_eq!(drops(&counters), []);
 }
 
+/// The last header says that a hop-by-hop header follows, where none may stand and no byte is left.
+#[test]
+fn ipv6_extension_headers_that_end_early_are_malformed() {
+    let mut bytes = Vec::new();
+    PacketBuilder::ethernet2([1; 6], [2; 6])
+        .ipv6([1; 16], [2; 16], 64)
+        .udp(1, PORT)
+        .write(&mut bytes, &[])
+        .unwrap();
+    for (first, second) in [(60, 0), (43, 60), (60, 44), (60, 51), (0, 0)] {
+        bytes[20] = first;
+        bytes[54..].copy_from_slice(&[second, 0, 0, 0, 0, 0, 0, 0]);
+        let (payloads, counters) = read(&pcap(1, &[bytes.clone()]));
+        assert!(payloads.is_empty());
+        assert_eq!(drops(&counters), [("malformed", 1)], "{first}, {second}");
+    }
+}
+
 #[test]
 fn what_is_not_delivered_is_counted_by_reason() {
     let mut arp = vec![0xFF; 12];

@@ -113,6 +113,18 @@ fn from_ip(bytes: &[u8]) -> Result<LaxSlicedPacket<'_>, Ignored> {
     })
 }
 
+/// Whether `etherparse` steps over this extension header of IPv6.
+fn steps_over(header: IpNumber) -> bool {
+    matches!(
+        header,
+        IpNumber::IPV6_HEADER_HOP_BY_HOP
+            | IpNumber::IPV6_ROUTE_HEADER
+            | IpNumber::IPV6_FRAGMENTATION_HEADER
+            | IpNumber::IPV6_DESTINATION_OPTIONS
+            | IpNumber::AUTHENTICATION_HEADER
+    )
+}
+
 /// What is needed of an IP packet.
 struct IpPart<'a> {
     sender: IpAddr,
@@ -148,6 +160,11 @@ impl<'a> IpPart<'a> {
             }
             Some(LaxNetSlice::Ipv6(v6)) => {
                 let (header, payload) = (v6.header(), v6.payload());
+                // `etherparse` stopped inside the extension headers. Its iterator over them takes
+                // for granted that all of them were checked, and reads past the end of these.
+                if steps_over(payload.ip_number) {
+                    return Err(Ignored::Malformed);
+                }
                 let mut extensions = v6.extensions().clone().into_iter();
                 let fragment = extensions.find_map(|extension| match extension {
                     Ipv6ExtensionSlice::Fragment(f) if f.is_fragmenting_payload() => Some((
