@@ -8,6 +8,7 @@ use std::path::Path;
 
 use hachi_robosense::encode as helios;
 use hachi_robosense::packet as helios_packet;
+use hachi_unitree::frame as unitree;
 use hachi_velodyne::encode as vlp16;
 use hachi_velodyne::packet as vlp16_packet;
 
@@ -112,6 +113,45 @@ fn stream(ticks: u8, packet: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// A robot that stands, as its states have it: high level, low level.
+fn unitree_states(layout: &unitree::Layout) -> [Vec<u8>; 2] {
+    let mut high = unitree::HighState::of(layout);
+    high.body.imu.quaternion[0] = 1.0;
+    high.body.imu.accelerometer[2] = 9.8;
+    for (i, motor) in high.body.motors.iter_mut().enumerate() {
+        motor.angle = [0.0, 0.9, -1.8][i % 3];
+        motor.torque = [0.5, 1.0, 8.0][i % 3];
+    }
+    let mut low = unitree::LowState::of(layout);
+    low.body = high.body.clone();
+    low.tick_ms = 12_345;
+    let form = unitree::CheckForm::Transformed;
+    [
+        high.encode(form).as_bytes().to_vec(),
+        low.encode(layout).as_bytes().to_vec(),
+    ]
+}
+
+/// A walking command and motors that are asked nothing.
+fn unitree_commands(layout: &unitree::Layout) -> [Vec<u8>; 2] {
+    let form = unitree::CheckForm::Plain;
+    let high = unitree::HighCmd {
+        mode: 2,
+        gait: 1,
+        velocity: [0.3, -0.1],
+        ..unitree::HighCmd::default()
+    };
+    let high = high.encode(layout, form).expect("the numbers are finite");
+    let low = unitree::LowCmd::default();
+    let (low, _) = low.encode(layout, form).expect("the numbers are finite");
+    [high.as_bytes().to_vec(), low.as_bytes().to_vec()]
+}
+
+/// Numbers of a walk: bytes around the middle stand for joints near zero.
+fn leg_numbers() -> Vec<u8> {
+    (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
+}
+
 fn with_switches(switches: u8, payload: Vec<u8>) -> Vec<u8> {
     [vec![switches], payload].concat()
 }
@@ -122,7 +162,11 @@ fn main() -> Result<()> {
     let position = vlp16::position_packet(&position).to_vec();
     let ethernet = [vec![1; 12], vec![8, 0], ipv4(0, &UDP)].concat();
     let fragments = [ipv4(0x2000, &UDP[..8]), ipv4(1, &UDP[8..])];
-    let seeds: [(&str, Vec<Vec<u8>>); 8] = [
+    let [go1_high, go1_low] = unitree_states(&unitree::Layout::GO1);
+    let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
+    let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
+    let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
+    let seeds: [(&str, Vec<Vec<u8>>); 11] = [
         (
             "velodyne_packet",
             vec![
@@ -149,6 +193,24 @@ fn main() -> Result<()> {
                 pcapng(&ipv4(0, &UDP)),
             ],
         ),
+        (
+            "unitree_state",
+            vec![
+                with_switches(0, go1_high),
+                with_switches(1, b1_high),
+                with_switches(0, go1_low),
+                with_switches(1, b1_low),
+            ],
+        ),
+        (
+            "unitree_command",
+            vec![
+                with_switches(0, go1_walk),
+                with_switches(1, b1_walk),
+                with_switches(0, go1_idle),
+            ],
+        ),
+        ("leg_tracker", vec![leg_numbers()]),
         (
             "nmea",
             vec![

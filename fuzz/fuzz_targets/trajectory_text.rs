@@ -33,6 +33,7 @@ fuzz_target!(|bytes: &[u8]| {
                 estimate: &evaluation.estimate,
                 reference: Some(&trajectory),
                 errors_m: Some(&evaluation.errors_m),
+                links: &[],
             };
             assert!(!plot.to_svg().expect("there are poses").contains("NaN"));
         }

@@ -4,10 +4,18 @@
 //! [`Violation`] with what was seen. Drivers, recordings and mocks are all held to these checks;
 //! the checks themselves hold no memory but the caller's.
 //!
-//! The promises are those written beside the traits in [`crate::device`]. [`ScanPromise`] and
+//! The promises are those written beside the traits: sensors' here, in the order of
+//! [`crate::device`], a robot's body in `robot`. [`ScanPromise`] and
 //! [`SamplePromise`] can also be fed by hand, next to other work on the same stream.
 
+mod robot;
+
 use core::fmt;
+
+pub use robot::{
+    BaseViolation, LegViolation, check_base_drive, check_battery, check_emergency_stop,
+    check_leg_kinematics, check_legs,
+};
 
 use crate::{Clock, Imu, ImuSample, LidarScans, PacketSource, Point, PointSink, ScanHeader, Stamp};
 

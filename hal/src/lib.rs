@@ -13,6 +13,9 @@
 //! | [`scan`] | [`ScanHeader`]: one turn of a LiDAR |
 //! | [`geometry`] | [`Pose`] and friends |
 //! | [`imu`], [`motion`] | inertial samples, external odometry |
+//! | [`legs`] | joints and feet of a quadruped; [`LegKinematics`] |
+//! | [`base`] | commands to a base, which die of age; [`BaseDrive`] |
+//! | [`power`], [`safety`] | battery, emergency stop, watchdog |
 //! | [`device`] | the device traits and [`FaultKind`] |
 //! | `mock`, `conformance` | scripted devices; each trait's promise as a check (features) |
 #![no_std]
@@ -21,11 +24,15 @@
 #[cfg(feature = "alloc")]
 extern crate alloc;
 
+pub mod base;
 pub mod device;
 pub mod geometry;
 pub mod imu;
+pub mod legs;
 pub mod motion;
 pub mod point;
+pub mod power;
+pub mod safety;
 pub mod scan;
 pub mod time;
 
@@ -34,10 +41,16 @@ pub mod conformance;
 #[cfg(feature = "mock")]
 pub mod mock;
 
+pub use base::{
+    BaseAction, BaseCommand, BaseDrive, BaseStatus, BodyPosture, BodyVelocity, CommandFault,
+};
 pub use device::{Clock, DeviceError, FaultKind, Imu, LidarScans, PacketSource, Received};
 pub use geometry::{Pose, Rotation, Vector3};
 pub use imu::ImuSample;
+pub use legs::{AttitudeSample, Leg, LegKinematics, LegPosture, LegState, LegStates, Matrix3};
 pub use motion::OdometrySample;
 pub use point::{Point, PointSink, ReturnKind, SinkFull};
+pub use power::{Battery, BatterySample};
+pub use safety::{EmergencyStop, StopSample, Watchdog};
 pub use scan::{Completeness, ScanHeader};
 pub use time::Stamp;

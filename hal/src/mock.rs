@@ -18,6 +18,8 @@
 //! source.assert_done();
 //! ```
 
+mod robot;
+
 use core::fmt;
 use core::marker::PhantomData;
 
@@ -25,6 +27,8 @@ use crate::{
     DeviceError, FaultKind, Imu, ImuSample, LidarScans, PacketSource, Point, PointSink, Received,
     ScanHeader, Stamp,
 };
+
+pub use robot::{MockBase, MockBattery, MockEmergencyStop, MockLegs, MockWatchdog};
 
 /// What a scripted device does on one call.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -51,6 +51,31 @@ const LAYERS: &[Layer] = &[
                   from any source, so only its tests name one",
     },
     Layer {
+        name: "hachi-unitree",
+        sees: &["hachi-hal", "hachi-datagram"],
+        tests_see: &["hachi-b1", "hachi-go1"],
+        because: "what a maker's robots share names none of them: only its tests put their numbers \
+                  in; a robot talks over the same sockets as a sensor, and no service is in sight",
+    },
+    Layer {
+        name: "hachi-b1",
+        sees: &["hachi-hal", "hachi-unitree"],
+        tests_see: &[],
+        because: "a robot is numbers for what its maker's robots share",
+    },
+    Layer {
+        name: "hachi-go1",
+        sees: &["hachi-hal", "hachi-unitree"],
+        tests_see: &[],
+        because: "a robot is numbers for what its maker's robots share",
+    },
+    Layer {
+        name: "hachi-kairos",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "a robot of another maker shares nothing with the others but hal",
+    },
+    Layer {
         name: "hachi-cloud",
         sees: &["hachi-hal"],
         tests_see: &[],
@@ -70,7 +95,7 @@ const LAYERS: &[Layer] = &[
     },
     Layer {
         name: "hachi-place",
-        sees: &["hachi-hal"],
+        sees: &["hachi-hal", "hachi-cloud"],
         tests_see: &["hachi-world"],
         because: "a place is recognised in any cloud: usable by someone who has never heard of this robot",
     },
@@ -90,7 +115,7 @@ const LAYERS: &[Layer] = &[
             "hachi-place",
             "hachi-posegraph",
         ],
-        tests_see: &["hachi-world"],
+        tests_see: &[],
         because: "a stage sees hal and the stages before it; files and threads are the program's",
     },
     Layer {

@@ -68,6 +68,26 @@ fn stamps_are_of_arrival_and_not_of_reading() {
 }
 
 #[test]
+fn who_is_spoken_to_from_a_source_can_answer_it() {
+    let mut source = open_from(1, Some(LOOPBACK));
+    let device = sender();
+    device
+        .set_read_timeout(Some(Duration::from_secs(5)))
+        .unwrap();
+    source.send(&[1, 2], device.local_addr().unwrap()).unwrap();
+    let mut buffer = [0; 4];
+    let (len, from) = device.recv_from(&mut buffer).unwrap();
+    assert_eq!(
+        (&buffer[..len], from.port()),
+        (&[1, 2][..], source.local_ports()[0])
+    );
+    device.send_to(&[3], from).unwrap();
+    let deadline = source.clock().now() + 5_000_000_000;
+    let answer = source.receive(&mut buffer, deadline).unwrap().unwrap();
+    assert_eq!(buffer[..answer.len], [3]);
+}
+
+#[test]
 fn nothing_by_the_deadline_is_none_and_on_time() {
     let mut source = open(2);
     let begun = Instant::now();

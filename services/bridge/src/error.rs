@@ -75,7 +75,9 @@ pub enum CloudError {
         expected: usize,
     },
     /// A file of bare rows whose size is no whole number of rows.
-    #[error("{got} bytes are not a whole number of {row}-byte points (x, y, z, intensity as f32)")]
+    #[error(
+        "{got} bytes are not a whole number of {row}-byte points (x, y, z, intensity as f32), nor of bare positions"
+    )]
     Rows {
         /// Bytes there are.
         got: u64,

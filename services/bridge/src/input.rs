@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::cloud::CloudFormat;
+use crate::cloud::{CloudFormat, bare_rows};
 use crate::error::advice;
 
 /// The formats that are read.
@@ -201,7 +201,7 @@ fn file_kind(path: &Path, size: u64) -> Result<InputKind, InputError> {
     let extension = path.extension().and_then(|ending| ending.to_str());
     let is_bin = extension.and_then(CloudFormat::from_extension) == Some(CloudFormat::Bin);
     // An empty scan is a scan: a lidar that saw nothing.
-    if is_bin && size.is_multiple_of(16) {
+    if is_bin && bare_rows::fits(size) {
         return Ok(InputKind::Cloud(CloudFormat::Bin));
     }
     if head.is_empty() {
@@ -383,6 +383,10 @@ mod tests {
         }
         assert_eq!(
             kind_of("0.bin", &[0; 32]).unwrap(),
+            InputKind::Cloud(CloudFormat::Bin)
+        );
+        assert_eq!(
+            kind_of("points.bin", &[0; 36]).unwrap(),
             InputKind::Cloud(CloudFormat::Bin)
         );
     }

@@ -3,6 +3,8 @@
 //! Only the shape of arguments is here; what they do is in [`commands`](crate::commands).
 
 pub mod graph;
+pub mod loops;
+pub mod map;
 pub mod mapping;
 
 use std::num::NonZeroUsize;
@@ -38,6 +40,9 @@ pub enum Command {
     /// Measure results against a reference.
     #[command(subcommand)]
     Eval(Eval),
+    /// Look into saved maps, export them, find a place in them, put them together.
+    #[command(subcommand)]
+    Map(map::Map),
     /// Work on pose graphs.
     #[command(subcommand)]
     Graph(graph::Graph),
@@ -51,6 +56,8 @@ pub enum Command {
     after_help = "Example:\n  hachi eval trajectory --reference truth.tum --estimate trajectory.tum"
 )]
 pub enum Eval {
+    /// Precision and recall of place recognition on keyframe scans.
+    Loops(loops::EvalLoopsArguments),
     /// Align two clouds with GICP.
     Registration(mapping::EvalRegistrationArguments),
     /// Absolute and relative pose error of a trajectory, as evo computes them.
@@ -125,7 +132,7 @@ pub(crate) fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Metres, more than zero.
-fn metres(text: &str) -> Result<f64, String> {
+pub(crate) fn metres(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("expected a number of metres, more than 0".to_owned()),

@@ -3,9 +3,11 @@
 pub mod decode;
 pub mod demo;
 pub mod doctor;
+pub mod eval_loops;
 pub mod eval_registration;
 pub mod eval_trajectory;
 pub mod graph_optimize;
+pub mod map;
 pub mod replay;
 
 use crate::cli::graph::Graph;
@@ -21,8 +23,10 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
+        Command::Eval(Eval::Loops(arguments)) => eval_loops::run(&arguments),
         Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
+        Command::Map(command) => map::run(&command),
         Command::Graph(Graph::Optimize(arguments)) => graph_optimize::run(&arguments),
         Command::Doctor(arguments) => doctor::run(&arguments),
     }

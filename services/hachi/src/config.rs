@@ -8,6 +8,7 @@ use std::path::Path;
 use hachi_cloud::FilterConfig;
 use hachi_hal::{Pose, Rotation, Vector3};
 use hachi_odometry::OdometryConfig;
+use hachi_slam::SlamConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
@@ -74,6 +75,8 @@ pub struct MappingConfig {
     pub filter: FilterConfig,
     /// Odometry.
     pub odometry: OdometryConfig,
+    /// SLAM.
+    pub slam: SlamConfig,
     /// The map.
     pub map: MapConfig,
 }
@@ -163,6 +166,16 @@ impl MappingConfig {
                 odometry.odometry_error_share,
             ),
             ("map.voxel_m", self.map.voxel_m),
+            (
+                "slam.node_every_m",
+                self.slam.node_every_m.unwrap_or(f64::MIN_POSITIVE),
+            ),
+            ("slam.node_every_rad", self.slam.node_every_rad),
+            ("slam.loop_submaps", self.slam.loop_submaps as f64),
+            ("slam.loop_least_way_m", self.slam.loop_least_way_m),
+            ("slam.loop_least_overlap", self.slam.loop_least_overlap),
+            ("slam.loop_least_inliers", self.slam.loop_least_inliers),
+            ("slam.submap_memory_mb", self.slam.submap_memory_mb as f64),
         ];
         for (key, value) in positive {
             if !(value > 0.0 && value.is_finite()) {

@@ -14,7 +14,10 @@
 //! | [`recording`], [`motion_samples`] | recordings of any kind as scans and samples |
 //! | [`config`] | settings |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
+//! | [`precision_recall_picture`] | precision over recall |
+//! | [`slam_stage`] | SLAM as a stage of the flow |
 //! | [`results`] | the files of a run |
+//! | [`saved_maps`] | saved maps as the commands open them |
 
 pub mod cli;
 pub mod commands;
@@ -28,10 +31,13 @@ pub mod map_picture;
 pub mod mapping;
 pub mod motion_samples;
 pub mod output;
+pub mod precision_recall_picture;
 pub mod progress;
 pub mod recording;
 pub mod report;
 pub mod results;
+pub mod saved_maps;
+pub mod slam_stage;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -3,11 +3,13 @@
 //! In: scans with what else was measured. Out: a pose for each scan, a map, a report. Read
 //! [`Mapping::step`] first; [`run`] feeds it from any recording, or from the simulated robot.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use hachi_cloud::{Filtered, Filters, IntensityUse, RemovalCounts, ScanFrames};
 use hachi_hal::{ImuSample, OdometrySample, Point, Pose, ScanHeader, Stamp};
 use hachi_odometry::{Condition, Estimate, Odometry, ScanInput};
+use hachi_slam::{Slam, SlamEstimate};
 use hachi_trajectory::Trajectory;
 use indicatif::ProgressBar;
 use tracing::{info, warn};
@@ -19,12 +21,14 @@ use crate::map_builder::MapBuilder;
 use crate::motion_samples::MotionSamples;
 use crate::recording::ScanSource;
 use crate::report::{ConditionCounts, Report, RunState, StageRecorder, peak_rss_mb};
+use crate::slam_stage::SlamStage;
 
-const STAGES: [&str; 4] = ["read", "filter", "odometry", "map"];
+const STAGES: [&str; 5] = ["read", "filter", "odometry", "slam", "map"];
 const READ: usize = 0;
 const FILTER: usize = 1;
 const ODOMETRY: usize = 2;
-const MAP: usize = 3;
+const SLAM: usize = 3;
+const MAP: usize = 4;
 
 /// A scan joins the map when the sensor has moved this far since the last that did.
 const MAPPED_EVERY_M: f64 = 0.2;
@@ -42,6 +46,7 @@ pub struct Mapping {
     filters: Filters,
     odometry: Odometry,
     kept: Vec<Point>,
+    slam: Option<SlamStage>,
     map: MapBuilder,
     trajectory: Trajectory,
     /// Where the last scan that the map took in was.
@@ -56,11 +61,12 @@ pub struct Mapping {
 }
 
 impl Mapping {
-    /// A pipeline with these settings.
+    /// A pipeline with these settings. What the map holds beyond a few megabytes is kept on the disk
+    /// of the folder `scratch`.
     ///
     /// # Errors
     /// A setting that no filter can work with.
-    pub fn new(config: MappingConfig) -> Result<Self, Failure> {
+    pub fn new(config: MappingConfig, scratch: &Path) -> Result<Self, Failure> {
         let filters = Filters::new(config.filter.clone())
             .map_err(|error| Failure::new(error, "correct the [filter] section"))?;
         Ok(Self {
@@ -71,7 +77,8 @@ impl Mapping {
             filters,
             odometry: Odometry::new(config.odometry.clone()),
             kept: Vec::new(),
-            map: MapBuilder::new(config.map.voxel_m),
+            slam: None,
+            map: MapBuilder::new(config.map.voxel_m, scratch),
             trajectory: Trajectory::new(),
             mapped_at: None,
             times: StageRecorder::new(&STAGES),
@@ -83,6 +90,14 @@ impl Mapping {
             points: 0,
             config,
         })
+    }
+
+    /// With SLAM: loops close, and the map is made of its submaps.
+    #[must_use]
+    pub fn with_slam(mut self, slam: Slam) -> Self {
+        let base_from_lidar = self.frames.base_from_lidar;
+        self.slam = Some(SlamStage::new(slam, base_from_lidar));
+        self
     }
 
     /// One scan: filter, place, remember.
@@ -107,10 +122,19 @@ impl Mapping {
         };
         let estimate = self.odometry.step(&input);
         let placed_at = Instant::now();
-        self.extend_map(header, &estimate);
+        let stage = match &mut self.slam {
+            Some(slam) => {
+                slam.step(header, &self.kept, &self.odometry, &estimate);
+                SLAM
+            }
+            None => {
+                self.extend_map(header, &estimate);
+                MAP
+            }
+        };
         self.times.stage(FILTER, filtered_at - start);
         self.times.stage(ODOMETRY, placed_at - filtered_at);
-        self.times.stage(MAP, placed_at.elapsed());
+        self.times.stage(stage, placed_at.elapsed());
         self.account(points.len(), &filtered, &estimate);
         estimate
     }
@@ -175,6 +199,37 @@ impl Mapping {
         }
     }
 
+    /// The end of a recording: with SLAM, the work under way is finished, and trajectory and map are
+    /// made anew from all that was learnt.
+    ///
+    /// # Errors
+    /// A submap can't be read back.
+    pub fn finish(&mut self) -> Result<(), Failure> {
+        let Some(slam) = &mut self.slam else {
+            return Ok(());
+        };
+        slam.finish();
+        self.trajectory = slam.trajectory();
+        slam.build_map(&mut self.map)
+    }
+
+    /// The poses so far by odometry alone, in the frame of the first.
+    pub fn odometry(&self) -> Trajectory {
+        self.slam
+            .as_ref()
+            .map_or_else(|| self.trajectory.clone(), SlamStage::odometry)
+    }
+
+    /// Where the last scan was on the map, with SLAM.
+    pub fn place(&self) -> Option<SlamEstimate> {
+        self.slam.as_ref().and_then(SlamStage::place)
+    }
+
+    /// SLAM, if it is part of the flow.
+    pub fn slam(&self) -> Option<&SlamStage> {
+        self.slam.as_ref()
+    }
+
     /// The poses so far, `map_from_base`.
     pub fn trajectory(&self) -> &Trajectory {
         &self.trajectory
@@ -209,6 +264,9 @@ impl Mapping {
         };
         for (reason, count) in self.removed.iter() {
             report.drop_for(reason, count);
+        }
+        if let Some(slam) = &self.slam {
+            report.loops = slam.loop_counts().into();
         }
         self.times.fill(&mut report);
         report

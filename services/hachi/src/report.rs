@@ -105,6 +105,16 @@ pub struct LoopCounts {
     pub refused: u64,
 }
 
+impl From<hachi_slam::LoopCounts> for LoopCounts {
+    fn from(counts: hachi_slam::LoopCounts) -> Self {
+        Self {
+            candidates: counts.candidates,
+            accepted: counts.accepted,
+            refused: counts.refused,
+        }
+    }
+}
+
 impl From<LatencySummary> for StageTimes {
     fn from(times: LatencySummary) -> Self {
         Self {

@@ -9,6 +9,7 @@ use crate::exit::Failure;
 use crate::map_builder::MapBuilder;
 use crate::map_picture;
 use crate::report::Report;
+use crate::slam_stage::{LEDGER_HEADING, SlamStage};
 
 /// The folder of a run.
 #[derive(Debug)]
@@ -43,6 +44,11 @@ impl Results {
             ));
         }
         Self::create(folder)
+    }
+
+    /// The folder itself.
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// The path of a file in the folder.
@@ -85,12 +91,13 @@ impl Results {
         map_picture::write(&self.path("map.png"), map, trajectory)
     }
 
-    /// The ledger of loops. Odometry alone closes none: only the heading is written.
+    /// The ledger of loops. Odometry alone closes none: then only the heading is written.
     ///
     /// # Errors
     /// The file can't be written.
-    pub fn no_loops(&self) -> Result<(), Failure> {
-        self.write("loops.csv", LOOPS_HEADING.as_bytes())
+    pub fn loops(&self, slam: Option<&SlamStage>) -> Result<(), Failure> {
+        let table = slam.map_or_else(|| LEDGER_HEADING.to_owned(), SlamStage::ledger_csv);
+        self.write("loops.csv", table.as_bytes())
     }
 
     /// The report.
@@ -101,9 +108,11 @@ impl Results {
         report.write(&self.path("report.json"))
     }
 
-    fn write(&self, name: &str, content: &[u8]) -> Result<(), Failure> {
+    /// A file with this content, whole or not at all.
+    ///
+    /// # Errors
+    /// It can't be written.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<(), Failure> {
         write_file(self.path(name), content).map_err(|error| Failure::unwritten(&error))
     }
 }
-
-const LOOPS_HEADING: &str = "from_scan,to_scan,accepted,reason\n";

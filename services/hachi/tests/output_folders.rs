@@ -48,6 +48,37 @@ fn a_disk_too_small_for_the_map_still_takes_the_rest() {
 }
 
 #[test]
+fn a_disk_that_fills_up_on_the_way_costs_the_map_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = capture(folder.path(), 4.0);
+    // Cubes so small that hardly two points share one: more than stay in memory.
+    let config = program::file(folder.path(), "fine.toml", "[map]\nvoxel_m = 0.001\n");
+    let out = folder.path().join("out");
+    let arguments = [
+        "replay",
+        text(&input),
+        "--out",
+        text(&out),
+        "--config",
+        text(&config),
+    ];
+    run(&arguments).success();
+    let points = fs::metadata(out.join("map.ply")).unwrap().len() / 16;
+    assert!(points > 150_000, "{points}");
+    fs::remove_dir_all(&out).unwrap();
+
+    let run = on_a_disk_of(1_000, &arguments);
+    let line = run.late_failure();
+    assert!(line.contains("map.ply") && line.contains("space"), "{line}");
+    nothing_half_written(&out);
+    assert!(!out.join("map.ply").exists() && !out.join("map.png").exists());
+    let report = report(&out);
+    assert_eq!(report["state"], "output_failed");
+    let poses = program::tum(&out.join("trajectory.tum"));
+    assert_eq!(report["scans"], poses.len());
+}
+
+#[test]
 fn a_full_disk_stops_decoding_with_the_turns_so_far() {
     let folder = tempfile::tempdir().unwrap();
     let input = capture(folder.path(), 0.35);

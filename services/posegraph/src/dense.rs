@@ -92,8 +92,7 @@ impl<F: FnMut(usize) -> bool> Elimination<'_, F> {
             for j in begin..k {
                 pivot -= self.matrix[j * rows + k].powi(2);
             }
-            // Also true for NaN.
-            if !(pivot > self.least[k]) || pivot == f64::INFINITY {
+            if pivot.is_nan() || pivot <= self.least[k] || pivot == f64::INFINITY {
                 let finite = pivot.is_finite();
                 if !finite || !(self.weak)(k) {
                     return Err(PivotFailure { column: k, finite });
@@ -147,6 +146,10 @@ fn finish_panel<S: Simd, const C: usize>(simd: S, panel: &mut [f64], rows: usize
         }
         i += lanes;
     }
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "row i of every column, each of which needs the ones before it"
+    )]
     for i in whole..length {
         for c in 0..C {
             let mut v = columns[c][i];

@@ -1,6 +1,6 @@
 //! Initial poses from the graph alone.
 //!
-//! In: a [`Graph`] whose poses are unknown or not to be trusted. Out: the same graph with poses that
+//! In: a [`Graph`](crate::Graph) whose poses are unknown or not to be trusted. Out: the same graph with poses that
 //! a solver can start from. Fixed poses, and of each part without one the pose with the smallest
 //! key, stay where they are.
 

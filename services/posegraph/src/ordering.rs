@@ -281,8 +281,7 @@ impl MinimumDegree {
         self.merge_alike(late);
         let remaining = (n - order.len()) as u32;
         self.member_begin.push(self.member_lists.len());
-        for at in 0..members.len() {
-            let i = members[at];
+        for &i in &members {
             let k = i as usize;
             let count = self.count[k];
             if count == 0 {

@@ -23,7 +23,7 @@ fn tangent<G: Group>(noise: &mut Noise, angle: f64) -> G::Tangent {
 
 /// From next to nothing to half a turn.
 const ANGLES: [f64; 11] = [
-    0.0, 1e-9, 1e-4, 9e-4, 1.1e-3, 0.0099, 0.0101, 0.3, 1.6, 3.0, 3.1415,
+    0.0, 1e-9, 1e-4, 9e-4, 1.1e-3, 0.0099, 0.0101, 0.3, 1.6, 3.0, 3.13,
 ];
 
 fn close<D: Dense>(a: &D, b: &D, tolerance: f64) {

@@ -40,6 +40,8 @@ pub struct Plot<'a> {
     pub reference: Option<&'a Trajectory>,
     /// The error of each pose of `estimate`, metres: colours its path. Used only if as many.
     pub errors_m: Option<&'a [f64]>,
+    /// Places that were recognised: straight lines between two points, in the same frame.
+    pub links: &'a [(Vector3, Vector3)],
 }
 
 /// Why there is no picture.
@@ -84,6 +86,7 @@ impl Plot<'_> {
                 estimate: &estimate,
                 reference: &reference,
                 errors,
+                links: self.links,
             };
             canvas.title(&title, self.title, self.subtitle)?;
             canvas.top_view(&top)?;
@@ -134,6 +137,7 @@ mod tests {
             estimate,
             reference: None,
             errors_m: None,
+            links: &[],
         }
     }
 

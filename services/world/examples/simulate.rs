@@ -1,20 +1,23 @@
-//! Writes a simulated capture and its truth: `simulation.pcap` and `truth.tum`.
+//! Writes a simulated capture and its truth: `simulation.pcap`, `truth.tum` and `true_loops.csv`,
+//! the loops of the walk.
 //!
 //! `cargo run --release -p hachi-world --example simulate -- --preset glass-corridor --seconds 20 --out DIR`
 #![allow(clippy::print_stdout, reason = "a program that reports to a person")]
 
 use std::error::Error;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Parser;
-use hachi_world::{Preset, SensorKind, Simulation, SimulationConfig, write_pcap, write_tum};
+use hachi_world::{
+    LoopSearch, Preset, SensorKind, Simulation, SimulationConfig, write_pcap, write_tum,
+};
 
 #[derive(Parser)]
 struct Arguments {
-    /// office, glass-corridor, corridor or stress.
+    /// office, glass-corridor, corridor, stress, building, campus or campus-long.
     #[arg(long, default_value = "office", value_parser = preset)]
     preset: Preset,
     /// vlp16, vlp16-dual or helios16p.
@@ -66,6 +69,33 @@ fn main() -> Result<(), Box<dyn Error>> {
     let took = began.elapsed().as_secs_f64();
     let truth = File::create(arguments.out.join("truth.tum"))?;
     write_tum(simulation.config().truth(10_000_000), BufWriter::new(truth))?;
+    let loops = simulation.config().true_loops(&LoopSearch::default());
+    let mut table = BufWriter::new(File::create(arguments.out.join("true_loops.csv"))?);
+    writeln!(
+        table,
+        "from_s,to_s,earlier_from_s,earlier_to_s,length_m,distance_m,yaw_deg,direction"
+    )?;
+    let start = simulation.config().start;
+    for pass in &loops.passes {
+        let times = [
+            pass.first.later,
+            pass.last.later,
+            pass.first.earlier,
+            pass.last.earlier,
+        ]
+        .map(|stamp| format!("{:.2}", stamp.secs_since(start)));
+        writeln!(
+            table,
+            "{},{:.1},{:.2},{:.1},{:?}",
+            times.join(","),
+            pass.length_m(),
+            pass.nearest.distance_m,
+            pass.nearest.yaw_rad.to_degrees(),
+            pass.direction(),
+        )?;
+    }
+    table.flush()?;
+    println!("{:.1} m, {} loops", loops.way_m, loops.passes.len());
     println!(
         "{packets} packets in {took:.2} s: {:.1} times live",
         arguments.seconds / took

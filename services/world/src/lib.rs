@@ -1,5 +1,5 @@
-//! The simulated world: the sensors' own bytes from a robot that walks through a building, and the
-//! exact truth beside them.
+//! The simulated world: the sensors' own bytes from a robot that walks through a building or a
+//! campus, and the exact truth beside them.
 //!
 //! In: a seed and a [`Preset`], or a scene and a patrol put together with [`SceneBuilder`] and
 //! [`TrajectoryBuilder`]. Out: UDP payloads as a VLP-16 or an RS-Helios-16P sends them, inertial
@@ -14,7 +14,9 @@
 //! | [`sensor`] | which sensors there are, and when their lasers fire |
 //! | [`simulation`], [`lidar`] | packet after packet; as a [`hachi_hal::PacketSource`] |
 //! | [`imu`], [`odometry`] | the other sensors |
-//! | [`preset`] | ready-made buildings |
+//! | [`legs`] | joints, feet and body of a quadruped that walks the path |
+//! | [`loops`] | when the robot truly comes back to where it has been |
+//! | [`preset`] | ready-made buildings and campuses |
 //! | [`capture`] | pcap and TUM files |
 //!
 //! ```
@@ -27,13 +29,19 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod aim;
 mod building;
 mod calendar;
+mod campus;
 pub mod capture;
+mod fan;
 pub mod floor;
+mod ground;
 mod helios;
 pub mod imu;
+pub mod legs;
 pub mod lidar;
+pub mod loops;
 pub mod material;
 pub mod motion;
 mod noise;
@@ -51,9 +59,11 @@ pub mod trajectory;
 mod vlp16;
 
 pub use capture::{CaptureError, CaptureWriter, write_pcap, write_tum};
-pub use floor::{Floor, RaisedFloor};
+pub use floor::{Floor, RaisedFloor, Terrain, Wave};
 pub use imu::{GRAVITY, ImuConfig, SimulatedImu};
+pub use legs::{LegDimensions, LegTick, LegsConfig, WalkingLegs};
 pub use lidar::{SimulatedLidar, SimulatedLidarError};
+pub use loops::{Direction, LoopPass, LoopSearch, Revisit, TrueLoops};
 pub use material::{Finish, Material};
 pub use motion::{Axis, BodyMotion, Harmonic};
 pub use odometry::{OdometryConfig, SimulatedOdometry};

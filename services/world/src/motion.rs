@@ -76,6 +76,24 @@ impl BodyMotion {
         }
     }
 
+    /// On wheels over paving: 3 mm up and down, half a degree of pitch and roll.
+    pub fn rolling() -> Self {
+        let harmonic = |axis, amplitude, frequency_hz, phase| Harmonic {
+            axis,
+            amplitude,
+            frequency_hz,
+            phase,
+        };
+        Self {
+            harmonics: vec![
+                harmonic(Axis::Height, 0.003, 3.1, 0.0),
+                harmonic(Axis::Pitch, 0.5f64.to_radians(), 1.3, 0.9),
+                harmonic(Axis::Roll, 0.5f64.to_radians(), 0.9, 0.3),
+            ],
+            only_while_moving: true,
+        }
+    }
+
     /// Carried by hand at a brisk pace: steps and shakes at 2 Hz, and the bearer looks left and
     /// right, at up to 80 degrees a second on top of the turns of the path.
     pub fn hand_held() -> Self {

@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use crate::building::{glass_corridor, office};
+use crate::building::{glass_corridor, office, storey};
+use crate::campus::{campus, large_campus};
 use crate::material::Material;
 use crate::noise::{Purpose, generator};
 use crate::scene::Scene;
@@ -30,15 +31,27 @@ pub enum Preset {
     Corridor,
     /// The office, with the sensor carried by somebody who hurries, shakes and looks around.
     Stress,
+    /// A quadruped at 1 m/s on a storey with corridors on a grid, some of which look alike: more
+    /// than 300 m that come back to known corridors in the same and the opposite direction.
+    Building,
+    /// A quadruped that trots at 2 m/s through the streets of a campus on rolling ground: more
+    /// than 2 km, with streets seen again in the same and the opposite direction, some alike.
+    Campus,
+    /// A robot on wheels at 4 m/s in a campus of ninety blocks: more than 20 km, of which the
+    /// greater part leads through streets not seen before.
+    CampusLong,
 }
 
 impl Preset {
     /// All of them.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 7] = [
         Self::Office,
         Self::GlassCorridor,
         Self::Corridor,
         Self::Stress,
+        Self::Building,
+        Self::Campus,
+        Self::CampusLong,
     ];
 
     /// Its name on a command line.
@@ -48,6 +61,9 @@ impl Preset {
             Self::GlassCorridor => "glass-corridor",
             Self::Corridor => "corridor",
             Self::Stress => "stress",
+            Self::Building => "building",
+            Self::Campus => "campus",
+            Self::CampusLong => "campus-long",
         }
     }
 
@@ -64,6 +80,15 @@ impl Preset {
             Self::GlassCorridor => glass_corridor(&mut random, Gait::quadruped()),
             Self::Corridor => corridor(),
             Self::Stress => office(&mut random, Gait::hand_held()),
+            Self::Building => storey(
+                seed,
+                Gait {
+                    corner_cut_m: 1.4,
+                    ..Gait::trotting(1.0)
+                },
+            ),
+            Self::Campus => campus(seed, Gait::trotting(2.0)),
+            Self::CampusLong => large_campus(seed, Gait::wheeled(4.0)),
         }
     }
 }

@@ -3,8 +3,13 @@
 //! In: echoes. Out: the strongest, or last and strongest, with noise and rounding, and the
 //! truth about it. Elsewhere: where the echoes come from (`optics`).
 
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use crate::noise::{Purpose, generator, normals};
 use crate::optics::{Echo, MIN_POWER, MIN_RANGE_M, ReturnLabel};
 use crate::scene::ObjectId;
+use crate::sensor::MAX_RANGE_M;
 use crate::simulation::NoiseConfig;
 
 /// The truth about one channel of a data packet.
@@ -12,7 +17,7 @@ use crate::simulation::NoiseConfig;
 pub struct ReturnTruth {
     /// What the return is.
     pub label: ReturnLabel,
-    /// What scattered the light back; 0 where there is no return.
+    /// What scattered the light back; 0 where there is no return or a stray one.
     pub object: ObjectId,
     /// Length of the light's path without noise or rounding, metres; 0 where there is no return.
     pub distance_m: f32,
@@ -28,6 +33,9 @@ pub(crate) struct Report {
 
 /// Echoes nearer to each other than this are one to a dual-return sensor (VLP-16 manual), metres.
 const DUAL_SEPARATION_M: f32 = 1.0;
+
+/// Stray returns are at most so bright.
+const STRAY_INTENSITY: f32 = 25.0;
 
 /// The strongest detectable echo that is apart from `other`.
 pub(crate) fn strongest_of(echoes: &[Echo], threshold: f32, other: Option<&Echo>) -> Option<Echo> {
@@ -71,20 +79,21 @@ pub(crate) fn dual_of(echoes: &[Echo], threshold: f32) -> (Option<Echo>, Option<
 }
 
 /// How this shot's echoes are distorted.
-pub(crate) struct Measurement {
+pub(crate) struct Measurement<'a> {
     unit_m: f64,
-    range_error_m: f64,
-    intensity_factor: f64,
+    noise: &'a NoiseConfig,
+    /// Uniform numbers, of which normal ones are made only if there is something to report.
+    luck: [f64; 2],
     /// Least power that this shot detects.
     pub threshold: f32,
 }
 
-impl Measurement {
-    pub fn of(unit_m: f64, noise: &NoiseConfig, normal: [f64; 2], fading: f32) -> Self {
+impl<'a> Measurement<'a> {
+    pub fn of(unit_m: f64, noise: &'a NoiseConfig, luck: [f64; 2], fading: f32) -> Self {
         Self {
             unit_m,
-            range_error_m: noise.range_sigma_m * normal[0],
-            intensity_factor: 1.0 + noise.intensity_sigma * normal[1],
+            noise,
+            luck,
             // Around the threshold detection is a matter of luck: half to one and a half.
             threshold: MIN_POWER * (0.5 + fading),
         }
@@ -94,11 +103,15 @@ impl Measurement {
         let Some(echo) = echo else {
             return Default::default();
         };
-        let counts = (f64::from(echo.distance) + self.range_error_m) / self.unit_m;
-        let intensity = (f64::from(echo.intensity) * self.intensity_factor).round();
+        let [range, intensity] = normals(self.luck);
+        let range_error_m = self.noise.range_sigma_m * range;
+        let intensity_factor = 1.0 + self.noise.intensity_sigma * intensity;
+        let counts = (f64::from(echo.distance) + range_error_m) / self.unit_m;
+        let intensity = f64::from(echo.intensity) * intensity_factor;
         let report = Report {
-            distance: counts.round().clamp(1.0, 65_535.0) as u16,
-            intensity: intensity.clamp(0.0, 255.0) as u8,
+            // Both are rounded to the nearest.
+            distance: (counts + 0.5).clamp(1.0, 65_535.0) as u16,
+            intensity: (intensity + 0.5).clamp(0.0, 255.0) as u8,
         };
         let truth = ReturnTruth {
             label: echo.label,
@@ -106,6 +119,38 @@ impl Measurement {
             distance_m: echo.distance,
         };
         (report, truth)
+    }
+}
+
+/// Gives the stray returns of a packet, each channel's in its turn. Without any, it draws nothing.
+pub(crate) struct Strays {
+    share: f64,
+    random: Option<ChaCha8Rng>,
+}
+
+impl Strays {
+    pub fn new(seed: u64, share: f64, packet: u64) -> Self {
+        Self {
+            share,
+            random: (share > 0.0).then(|| generator(seed, Purpose::Strays, packet)),
+        }
+    }
+
+    /// The stray return, if there is one, that a pulse reports instead of `echo`.
+    pub fn instead_of(&mut self, echo: Option<Echo>) -> Option<Echo> {
+        let random = self.random.as_mut()?;
+        if random.random::<f64>() >= self.share {
+            return None;
+        }
+        let most = echo.map_or(MAX_RANGE_M, |echo| (2.0 * echo.distance).min(MAX_RANGE_M));
+        let distance = random.random_range(MIN_RANGE_M..most.max(2.0 * MIN_RANGE_M));
+        Some(Echo {
+            distance,
+            power: MIN_POWER,
+            intensity: random.random_range(1.0..STRAY_INTENSITY),
+            label: ReturnLabel::Stray,
+            object: 0,
+        })
     }
 }
 

@@ -13,7 +13,9 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Cuboid, Triangle};
 
+use crate::fan::{self, Scratch};
 use crate::floor::Floor;
+use crate::ground::Ground;
 use crate::material::Material;
 use crate::optics::brightness;
 
@@ -48,6 +50,10 @@ pub(crate) enum Shape {
         radius: f32,
         height: f32,
     },
+    Ball {
+        centre: Vector,
+        radius: f32,
+    },
     Triangle(Triangle),
 }
 
@@ -67,11 +73,15 @@ impl Shape {
                 *base - Vector::new(*radius, *radius, 0.0),
                 *base + Vector::new(*radius, *radius, *height),
             ),
+            Self::Ball { centre, radius } => {
+                let reach = Vector::new(*radius, *radius, *radius);
+                Aabb::new(*centre - reach, *centre + reach)
+            }
             Self::Triangle(triangle) => triangle.local_aabb(),
         }
     }
 
-    fn distance(&self, ray: &Ray, within: f32) -> Option<f32> {
+    pub fn distance(&self, ray: &Ray, within: f32) -> Option<f32> {
         match self {
             Self::AxisBox(bounds) => bounds.cast_local_ray(ray, within, true),
             Self::Box {
@@ -83,6 +93,7 @@ impl Shape {
                 radius,
                 height,
             } => cylinder_hit(*base, *radius, *height, ray).map(|(distance, _)| distance),
+            Self::Ball { centre, radius } => ball_hit(*centre, *radius, ray),
             Self::Triangle(triangle) => triangle.cast_local_ray(ray, within, true),
         }
     }
@@ -90,11 +101,15 @@ impl Shape {
     /// The normal where the ray hits; zero if it starts inside or misses.
     fn normal(&self, ray: &Ray, within: f32) -> Vector {
         let hit = match self {
-            Self::AxisBox(bounds) => bounds.cast_local_ray_and_get_normal(ray, within, true),
+            Self::AxisBox(bounds) => return box_normal(bounds, ray),
             Self::Box {
                 world_from_box,
                 cuboid,
-            } => cuboid.cast_ray_and_get_normal(world_from_box, ray, within, true),
+            } => {
+                let half = cuboid.half_extents;
+                let ray = ray.inverse_transform_by(world_from_box);
+                return world_from_box.rotation * box_normal(&Aabb::new(-half, half), &ray);
+            }
             Self::Cylinder {
                 base,
                 radius,
@@ -103,10 +118,45 @@ impl Shape {
                 return cylinder_hit(*base, *radius, *height, ray)
                     .map_or(Vector::ZERO, |(_, normal)| normal);
             }
+            Self::Ball { centre, radius } => {
+                return ball_hit(*centre, *radius, ray).map_or(Vector::ZERO, |distance| {
+                    (ray.point_at(distance) - *centre) / *radius
+                });
+            }
             Self::Triangle(triangle) => triangle.cast_local_ray_and_get_normal(ray, within, true),
         };
         hit.map_or(Vector::ZERO, |hit| hit.normal)
     }
+}
+
+/// The normal of the face by which a ray enters a box: that of the axis it gets between the faces of
+/// last. Zero if the ray starts inside.
+fn box_normal(bounds: &Aabb, ray: &Ray) -> Vector {
+    let (origin, dir) = (ray.origin.to_array(), ray.dir.to_array());
+    let (low, high) = (bounds.mins.to_array(), bounds.maxs.to_array());
+    let (mut last, mut normal) = (0.0, [0.0; 3]);
+    for axis in 0..3 {
+        if dir[axis] != 0.0 {
+            let face = if dir[axis] > 0.0 { low } else { high }[axis];
+            let enters = (face - origin[axis]) * (1.0 / dir[axis]);
+            if enters > last {
+                (last, normal) = (enters, [0.0; 3]);
+                normal[axis] = -dir[axis].signum();
+            }
+        }
+    }
+    Vector::from(normal)
+}
+
+/// Distance at which a ray from outside enters a ball.
+fn ball_hit(centre: Vector, radius: f32, ray: &Ray) -> Option<f32> {
+    let to_centre = centre - ray.origin;
+    let along = to_centre.dot(ray.dir);
+    // From the foot of the perpendicular, not from the squares of long distances.
+    let across = to_centre - ray.dir * along;
+    let chord = radius * radius - across.dot(across);
+    let distance = along - chord.max(0.0).sqrt();
+    (chord >= 0.0 && distance >= 0.0).then_some(distance)
 }
 
 /// Distance and normal where a ray from outside enters an upright cylinder.
@@ -146,6 +196,17 @@ fn cylinder_hit(base: Vector, radius: f32, height: f32, ray: &Ray) -> Option<(f3
 pub(crate) struct Primitive {
     pub shape: Shape,
     pub object: ObjectId,
+    pub bounds: Aabb,
+}
+
+impl Primitive {
+    pub fn new(shape: Shape, object: ObjectId) -> Self {
+        Self {
+            bounds: shape.bounds(),
+            shape,
+            object,
+        }
+    }
 }
 
 /// Where a ray met something.
@@ -163,15 +224,21 @@ pub struct Scene {
     primitives: Vec<Primitive>,
     objects: Vec<Object>,
     tree: Bvh,
+    ground: Option<Ground>,
     floor: Floor,
     brightest: f32,
 }
 
 impl Scene {
-    pub(crate) fn new(primitives: Vec<Primitive>, objects: Vec<Object>, floor: Floor) -> Self {
+    pub(crate) fn new(
+        primitives: Vec<Primitive>,
+        objects: Vec<Object>,
+        ground: Option<Ground>,
+        floor: Floor,
+    ) -> Self {
         let bounds: Vec<Aabb> = primitives
             .iter()
-            .map(|primitive| primitive.shape.bounds())
+            .map(|primitive| primitive.bounds)
             .collect();
         Self {
             brightest: objects
@@ -181,6 +248,7 @@ impl Scene {
             tree: Bvh::from_leaves(BvhBuildStrategy::Ploc, &bounds),
             primitives,
             objects,
+            ground,
             floor,
         }
     }
@@ -192,19 +260,69 @@ impl Scene {
 
     /// The first hit within `within` metres of a ray with a unit direction, passing by `ignore`.
     pub(crate) fn cast(&self, ray: &Ray, within: f32, ignore: Option<ObjectId>) -> Option<Hit> {
-        let (index, distance) = self.tree.cast_ray(ray, within, |index, best| {
+        let ground = (self.ground.as_ref())
+            .and_then(|ground| ground.cast(ray, within))
+            .filter(|hit| Some(hit.object) != ignore);
+        let within = ground.map_or(within, |hit| hit.distance);
+        let nearest = self.tree.cast_ray(ray, within, |index, best| {
             let primitive = &self.primitives[index as usize];
             if Some(primitive.object) == ignore {
                 return None;
             }
             primitive.shape.distance(ray, best)
-        })?;
+        });
+        match nearest {
+            Some((index, distance)) => Some(self.hit_on(index, ray, distance)),
+            None => ground,
+        }
+    }
+
+    /// As [`cast`](Self::cast) for each of the rays, passing by nothing. They come in fans, see
+    /// `fan`, and every `stride`-th ray is about the same, but for some thousandths of a turn.
+    /// Their hits are put in the place of what is in `hits`.
+    pub(crate) fn cast_fans(
+        &self,
+        rays: &[Ray],
+        stride: usize,
+        within: f32,
+        scratch: &mut Scratch,
+        hits: &mut Vec<Option<Hit>>,
+    ) {
+        hits.clear();
+        hits.resize(rays.len(), None);
+        if let Some(ground) = &self.ground {
+            ground.cast_alike(rays, stride, within, hits);
+        }
+        let nearest = &mut scratch.nearest;
+        nearest.distances.clear();
+        let reaches = hits
+            .iter()
+            .map(|hit| hit.map_or(within, |hit| hit.distance));
+        nearest.distances.extend(reaches);
+        nearest.primitives.clear();
+        nearest.primitives.resize(rays.len(), None);
+        if fan::cast(&self.tree, &self.primitives, rays, scratch) {
+            let nearest = &scratch.nearest;
+            let found = nearest.primitives.iter().zip(&nearest.distances);
+            for ((hit, ray), (number, distance)) in hits.iter_mut().zip(rays).zip(found) {
+                if let Some(number) = number {
+                    *hit = Some(self.hit_on(*number, ray, *distance));
+                }
+            }
+        } else {
+            for (hit, ray) in hits.iter_mut().zip(rays) {
+                *hit = self.cast(ray, within, None);
+            }
+        }
+    }
+
+    fn hit_on(&self, index: u32, ray: &Ray, distance: f32) -> Hit {
         let primitive = &self.primitives[index as usize];
-        Some(Hit {
+        Hit {
             distance,
             normal: primitive.shape.normal(ray, f32::MAX),
             object: primitive.object,
-        })
+        }
     }
 
     pub(crate) fn object(&self, id: ObjectId) -> &Object {
@@ -226,7 +344,7 @@ impl Scene {
         self.objects.len()
     }
 
-    /// How many boxes, cylinders and triangles the objects are made of.
+    /// How many boxes, cylinders, balls and triangles the objects are made of.
     pub fn primitive_count(&self) -> usize {
         self.primitives.len()
     }
@@ -292,6 +410,38 @@ mod tests {
     }
 
     #[test]
+    fn a_ball_is_hit_where_it_bulges() {
+        let mut builder = SceneBuilder::new();
+        builder.ball([5.0, 0.0, 0.0], 0.5, Material::CONCRETE);
+        let scene = builder.build();
+        let side = distance(&scene, [0.0, 0.3, 0.0], [1.0, 0.0, 0.0]).unwrap();
+        assert!((side - 4.6).abs() < 1e-5, "{side}"); // 3-4-5 triangle: 5 - 0.4
+        assert_eq!(distance(&scene, [0.0, 0.51, 0.0], [1.0, 0.0, 0.0]), None);
+        assert_eq!(distance(&scene, [9.0, 0.0, 0.0], [1.0, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_beam_reaches_from_end_to_end_along_its_slope() {
+        let mut builder = SceneBuilder::new();
+        builder.beam(
+            [0.0, 1.0, 0.0],
+            [4.0, 1.0, 1.0],
+            0.4,
+            0.3,
+            Material::CONCRETE,
+        );
+        let scene = builder.build();
+        // Its upper edge rises one in four, its ends are cut square to the slope.
+        for x in [0.1, 1.0, 2.0, 3.5] {
+            let down = distance(&scene, [x, 1.1, 3.0], [0.0, 0.0, -1.0]).unwrap();
+            assert!((3.0 - down - x / 4.0).abs() < 1e-5, "at {x}: {down}");
+        }
+        assert_eq!(distance(&scene, [1.0, 1.21, 3.0], [0.0, 0.0, -1.0]), None);
+        let side = distance(&scene, [2.0, 0.0, 0.4], [0.0, 1.0, 0.0]).unwrap();
+        assert!((side - 0.8).abs() < 1e-5, "{side}");
+    }
+
+    #[test]
     fn the_ramp_surface_is_where_the_floor_says() {
         let mut builder = SceneBuilder::new();
         builder.raised_floor(
@@ -347,6 +497,45 @@ mod tests {
                 got == expected || (got - expected).abs() < 1e-3,
                 "ray {k}: {got} and {expected}"
             );
+        }
+    }
+    #[test]
+    fn rays_cast_together_hit_what_they_hit_alone() {
+        use crate::Preset;
+        for preset in Preset::ALL {
+            let world = preset.world(5);
+            let (mut scratch, mut hits) = (Scratch::default(), Vec::new());
+            let mut same = 0;
+            for place in 0..60 {
+                let time_s = world.trajectory.period_s() * f64::from(place) / 60.0;
+                let eye = world.trajectory.map_from_base(time_s).translation.vector;
+                let heading = f64::from(place) * 0.9;
+                let rays: Vec<Ray> = (0..10)
+                    .flat_map(|fan| (0..8).map(move |ray| (fan, ray)))
+                    .map(|(fan, ray)| {
+                        let azimuth = heading + 0.02 * f64::from(fan) + 0.0003 * f64::from(ray);
+                        let up = 0.035 * f64::from(ray + 8 * (fan % 2)) - 0.26;
+                        let dir = Vector3::new(azimuth.cos(), azimuth.sin(), up).normalize();
+                        Ray::new(narrow(eye + Vector3::z() * 0.2), narrow(dir))
+                    })
+                    .collect();
+                world
+                    .scene
+                    .cast_fans(&rays, 16, 100.0, &mut scratch, &mut hits);
+                for (ray, together) in rays.iter().zip(&hits) {
+                    let alone = world.scene.cast(ray, 100.0, None);
+                    match (alone, together) {
+                        (None, None) => {}
+                        (Some(alone), Some(together)) => {
+                            let off = (alone.distance - together.distance).abs();
+                            assert!(off <= 1e-4 * alone.distance, "{preset:?}: {off}");
+                            same += usize::from(alone.object == together.object);
+                        }
+                        _ => panic!("{preset:?}: {ray:?} hits {alone:?}, {together:?}"),
+                    }
+                }
+            }
+            assert!(same > 1500, "{preset:?}: {same}");
         }
     }
 }

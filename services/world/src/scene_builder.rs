@@ -2,10 +2,11 @@
 
 use hachi_hal::Vector3;
 use parry3d::bounding_volume::Aabb;
-use parry3d::math::{Pose as ParryPose, Vector};
+use parry3d::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d::shape::{Cuboid, Triangle};
 
-use crate::floor::{Floor, RaisedFloor};
+use crate::floor::{Floor, RaisedFloor, Terrain};
+use crate::ground::{Cover, Ground};
 use crate::material::Material;
 use crate::scene::{Object, ObjectId, Primitive, Role, Scene, Shape, narrow};
 
@@ -14,6 +15,7 @@ use crate::scene::{Object, ObjectId, Primitive, Role, Scene, Shape, narrow};
 pub struct SceneBuilder {
     primitives: Vec<Primitive>,
     objects: Vec<Object>,
+    ground: Option<Ground>,
     floor: Floor,
 }
 
@@ -29,7 +31,7 @@ impl SceneBuilder {
     }
 
     fn part(&mut self, object: ObjectId, shape: Shape) {
-        self.primitives.push(Primitive { shape, object });
+        self.primitives.push(Primitive::new(shape, object));
     }
 
     /// A box of edges `size` around `centre`, turned by `yaw` radians about the vertical.
@@ -122,6 +124,77 @@ impl SceneBuilder {
         object
     }
 
+    /// A ball.
+    pub fn ball(&mut self, centre: [f64; 3], radius: f64, material: Material) -> ObjectId {
+        let object = self.object(material, Role::Structure);
+        self.part(
+            object,
+            Shape::Ball {
+                centre: narrow(Vector3::from(centre)),
+                radius: radius as f32,
+            },
+        );
+        object
+    }
+
+    /// A box from end to end that follows a slope, its sides upright: the line from `from` to `to`
+    /// runs along the middle of its upper face.
+    pub fn beam(
+        &mut self,
+        from: [f64; 3],
+        to: [f64; 3],
+        width: f64,
+        height: f64,
+        material: Material,
+    ) -> ObjectId {
+        let object = self.object(material, Role::Structure);
+        let [from, to] = [from, to].map(Vector3::from);
+        let along = to - from;
+        let (level, length) = (along.xy().norm(), along.norm());
+        let yaw = Rotation::from_rotation_z(along.y.atan2(along.x) as f32);
+        // A positive turn about y lowers the far end.
+        let turn = yaw * Rotation::from_rotation_y(-along.z.atan2(level) as f32);
+        let down = turn * Vector::new(0.0, 0.0, -(height as f32) / 2.0);
+        let shape = Shape::Box {
+            world_from_box: ParryPose::from_parts(narrow((from + to) / 2.0) + down, turn),
+            cuboid: Cuboid::new(narrow(Vector3::new(length, width, height) / 2.0)),
+        };
+        self.part(object, shape);
+        object
+    }
+
+    /// Rolling ground over a rectangle, and rectangles of it that are covered otherwise: a later
+    /// one lies over an earlier one. There is one terrain to a scene: a second replaces the first.
+    pub fn terrain(
+        &mut self,
+        terrain: Terrain,
+        low: [f64; 2],
+        high: [f64; 2],
+        material: Material,
+        covered: &[([f64; 2], [f64; 2], Material)],
+    ) {
+        let mut covers = vec![Cover {
+            low,
+            high,
+            object: self.object(material, Role::Floor),
+        }];
+        let mut kinds: Vec<(Material, ObjectId)> = Vec::new();
+        for &(low, high, material) in covered {
+            let known = kinds.iter().find(|(kind, _)| *kind == material);
+            let object = match known {
+                Some((_, object)) => *object,
+                None => {
+                    let object = self.object(material, Role::Floor);
+                    kinds.push((material, object));
+                    object
+                }
+            };
+            covers.push(Cover { low, high, object });
+        }
+        self.ground = Some(Ground::new(&terrain, low, high, &covers));
+        self.floor.terrain = Some(terrain);
+    }
+
     /// An upright pane 1 cm thick, centred on the line from one foot to the other.
     pub fn pane(
         &mut self,
@@ -204,6 +277,6 @@ impl SceneBuilder {
 
     /// The scene.
     pub fn build(self) -> Scene {
-        Scene::new(self.primitives, self.objects, self.floor)
+        Scene::new(self.primitives, self.objects, self.ground, self.floor)
     }
 }

@@ -27,6 +27,9 @@ pub struct NoiseConfig {
     pub range_sigma_m: f64,
     /// Standard deviation of an intensity, as a share of it.
     pub intensity_sigma: f64,
+    /// Share of the pulses that report a stray return: anywhere on the beam to twice as far as
+    /// what the pulse meets, or to the greatest range if it meets nothing, as bright as cloth.
+    pub stray_share: f64,
 }
 
 impl NoiseConfig {
@@ -34,7 +37,29 @@ impl NoiseConfig {
     pub const NONE: Self = Self {
         range_sigma_m: 0.0,
         intensity_sigma: 0.0,
+        stray_share: 0.0,
     };
+
+    /// A worn sensor in light rain: 5 cm, and two returns in a hundred are stray.
+    pub const MILD: Self = Self {
+        range_sigma_m: 0.05,
+        intensity_sigma: 0.10,
+        stray_share: 0.02,
+    };
+
+    /// In dust, beside other sensors: 15 cm, and a tenth of the returns is stray.
+    pub const STRONG: Self = Self {
+        range_sigma_m: 0.15,
+        intensity_sigma: 0.20,
+        stray_share: 0.10,
+    };
+
+    /// Three levels by name, from none to strong: what place recognition is measured at.
+    pub const LEVELS: [(&str, Self); 3] = [
+        ("none", Self::NONE),
+        ("mild", Self::MILD),
+        ("strong", Self::STRONG),
+    ];
 }
 
 /// 1.5 cm, half of the VLP-16 data sheet's typical 3 cm accuracy, and 5 % of intensity.
@@ -43,6 +68,7 @@ impl Default for NoiseConfig {
         Self {
             range_sigma_m: 0.015,
             intensity_sigma: 0.05,
+            stray_share: 0.0,
         }
     }
 }
@@ -177,8 +203,10 @@ const BATCH: usize = 32;
 pub struct Simulation {
     config: SimulationConfig,
     batch: Vec<DataPacket>,
-    /// Data packets made so far, and given out so far.
+    /// The number of the batch's first data packet, and of the first that is not made yet.
+    batch_begins: u64,
     made: u64,
+    /// The number of the next data packet to give out.
     given: u64,
     total: u64,
     status: [u8; helios::BYTES],
@@ -198,6 +226,7 @@ impl Simulation {
         Self {
             config,
             batch: vec![DataPacket::empty(); BATCH],
+            batch_begins: 0,
             made: 0,
             given: 0,
             total,
@@ -216,6 +245,20 @@ impl Simulation {
         self.total
     }
 
+    /// Leaves out what is received before `stamp`: what follows is the same as without, and takes
+    /// no longer the later it is. There is no way back.
+    pub fn skip_to(&mut self, stamp: Stamp) {
+        let sensor = self.config.sensor;
+        let ns = (stamp.as_nanos()).saturating_sub(self.config.start.as_nanos());
+        let behind_first = ns.saturating_sub(received_ns(sensor, 0)).max(0) as u64;
+        let index = behind_first
+            .div_ceil(sensor.packet_ns() as u64)
+            .min(self.total);
+        if index > self.given {
+            (self.given, self.made, self.status_due) = (index, index, false);
+        }
+    }
+
     /// When the next packet is received, if there is one.
     pub fn next_stamp(&self) -> Option<Stamp> {
         let index = if self.status_due {
@@ -226,6 +269,27 @@ impl Simulation {
         (index < self.total)
             .then(|| self.config.start + received_ns(self.config.sensor, index))
             .map(|stamp| stamp + i64::from(self.status_due) * STATUS_DELAY_NS)
+    }
+
+    /// Goes on, or back, to the first data packet that is received at `stamp` or later; what is sent
+    /// from there on is what it would have been without the leap.
+    pub fn seek(&mut self, stamp: Stamp) {
+        let after_ns = stamp.nanos_since(self.config.start);
+        let first = received_ns(self.config.sensor, 0);
+        let packet_ns = self.config.sensor.packet_ns();
+        let index = match after_ns <= first {
+            true => 0,
+            false => ((after_ns - first) as u64).div_ceil(packet_ns as u64),
+        };
+        let index = index.min(self.total);
+        self.status_due = false;
+        // Batches begin at multiples of their size.
+        self.made = index - index % BATCH as u64;
+        self.given = self.made;
+        if index > self.given {
+            self.make_batch();
+            self.given = index;
+        }
     }
 
     /// The next packet; `None` at the end. Status packets follow the data packet they come with.
@@ -245,7 +309,7 @@ impl Simulation {
         if self.given == self.made {
             self.make_batch();
         }
-        let packet = &self.batch[(self.given % BATCH as u64) as usize];
+        let packet = &self.batch[(self.given - self.batch_begins) as usize];
         self.status_due = self.given.is_multiple_of(sensor.data_per_status());
         self.given += 1;
         Some(SimulatedPacket {
@@ -259,6 +323,7 @@ impl Simulation {
     fn make_batch(&mut self) {
         let count = (self.total - self.made).min(BATCH as u64) as usize;
         let (config, first) = (&self.config, self.made);
+        self.batch_begins = first;
         self.batch[..count]
             .par_iter_mut()
             .enumerate()

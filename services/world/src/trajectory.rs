@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 use hachi_hal::{Pose, Rotation, Vector3};
 use nalgebra::{Matrix3, Rotation3, Translation3};
 
-use crate::floor::Floor;
+use crate::floor::{Floor, Rising};
 use crate::motion::BodyMotion;
 use crate::path::Path;
 use crate::smooth::Rise;
@@ -58,6 +58,27 @@ impl Gait {
             corner_cut_m: 1.0,
             base_height_m: 0.45,
             body: BodyMotion::trot(),
+        }
+    }
+
+    /// A quadruped that trots at `speed` m/s and rounds its corners the wider the faster it is, at
+    /// 1 rad/s: a corner cut by `c` metres has a curvature of 1.75 / c at most.
+    pub fn trotting(speed: f64) -> Self {
+        Self {
+            speed,
+            corner_cut_m: 1.75 * speed,
+            ..Self::quadruped()
+        }
+    }
+
+    /// A robot on wheels at `speed` m/s, at most 3 m/s² in corners: it hardly bobs.
+    pub fn wheeled(speed: f64) -> Self {
+        Self {
+            speed,
+            ramp_s: 2.0,
+            corner_cut_m: 1.75 * speed * speed / 3.0,
+            body: BodyMotion::rolling(),
+            ..Self::quadruped()
         }
     }
 
@@ -258,13 +279,18 @@ impl Trajectory {
         let [along, across] = HALF_STANCE_M;
         let foot = |f: f64, l: f64| {
             self.floor
-                .height(x + f * cos - l * sin, y + f * sin + l * cos)
+                .raised_height(x + f * cos - l * sin, y + f * sin + l * cos)
         };
         let [front_left, front_right] = [foot(along, across), foot(along, -across)];
         let [hind_left, hind_right] = [foot(-along, across), foot(-along, -across)];
-        let slope_along = (front_left + front_right - hind_left - hind_right) / (4.0 * along);
-        let slope_across = (front_left + hind_left - front_right - hind_right) / (4.0 * across);
-        let height = (front_left + front_right + hind_left + hind_right) / 4.0;
+        // The terrain curves by a fraction of a millimetre under the feet: its plane is their plane.
+        let terrain = self.floor.terrain.as_ref();
+        let rise = terrain.map_or_else(Rising::default, |terrain| terrain.rise(x, y));
+        let slope_along = (front_left + front_right - hind_left - hind_right) / (4.0 * along)
+            + (rise.slope[0] * cos + rise.slope[1] * sin);
+        let slope_across = (front_left + hind_left - front_right - hind_right) / (4.0 * across)
+            + (rise.slope[1] * cos - rise.slope[0] * sin);
+        let height = (front_left + front_right + hind_left + hind_right) / 4.0 + rise.height;
         // The plane's normal and its x axis, in a frame that only follows the heading.
         let forward = Vector3::new(1.0, 0.0, slope_along).normalize();
         let up = Vector3::new(-slope_along, -slope_across, 1.0).normalize();
@@ -325,6 +351,7 @@ mod tests {
                 level_m: 1.0,
                 height_m: 0.3,
             }],
+            ..Floor::default()
         };
         TrajectoryBuilder::new([0.0, 0.0], 0.0, gait)
             .stand(1.0)

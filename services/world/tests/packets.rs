@@ -187,6 +187,36 @@ fn the_same_seed_gives_the_same_bytes_with_one_thread_and_with_two() {
 }
 
 #[test]
+fn a_leap_in_time_changes_nothing_of_what_is_sent_after_it() {
+    let config = SimulationConfig::preset(Preset::Corridor, 1, 0.2);
+    let mut simulation = Simulation::new(config.clone());
+    let mut sent = Vec::new();
+    while let Some(packet) = simulation.next_packet() {
+        sent.push((packet.stamp, packet.bytes.to_vec()));
+    }
+    for leap in [
+        config.start,
+        sent[40].0,
+        sent[100].0,
+        config.start + 150_000_000,
+    ] {
+        simulation.seek(leap);
+        let first = sent.iter().position(|(stamp, _)| *stamp >= leap).unwrap();
+        // Position packets come with the data packet before them: a leap may pass one by.
+        for (stamp, bytes) in sent[first..].iter().filter(|(_, b)| b.len() == 1206) {
+            let packet = loop {
+                let packet = simulation.next_packet().unwrap();
+                if packet.bytes.len() == 1206 {
+                    break packet;
+                }
+            };
+            assert_eq!((packet.stamp, packet.bytes), (*stamp, &bytes[..]));
+        }
+        assert!(simulation.next_packet().is_none());
+    }
+}
+
+#[test]
 fn position_packets_come_one_to_fourteen_with_the_time_in_both_forms() {
     let mut config = SimulationConfig::preset(Preset::Corridor, 1, 2.0);
     config.start = Stamp::from_nanos(1_795_348_799_000_000_000); // 2026-11-22 11:59:59 UTC

@@ -111,6 +111,14 @@ pub enum UdpError {
         /// What the system said.
         source: io::Error,
     },
+    /// Sending failed.
+    #[error("cannot send to udp {to}: {source}")]
+    Send {
+        /// Where to.
+        to: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
     /// Waiting failed.
     #[error("cannot wait for datagrams: {source}")]
     Wait {
@@ -135,7 +143,7 @@ impl DeviceError for UdpError {
             Self::Ports { .. } | Self::Bind { .. } => FaultKind::FixConfig,
             Self::Option { .. } | Self::Wait { .. } => FaultKind::GiveUp,
             Self::Receive { .. } => FaultKind::Reopen,
-            Self::Oversize { .. } => FaultKind::ReadAgain,
+            Self::Oversize { .. } | Self::Send { .. } => FaultKind::ReadAgain,
         }
     }
 }
@@ -194,6 +202,15 @@ impl UdpSource {
     /// The clock of the stamps, on which deadlines count.
     pub fn clock(&self) -> SystemClock {
         self.clock
+    }
+
+    /// Sends a datagram from the first port, so that who answers it is heard by `receive`.
+    ///
+    /// # Errors
+    /// The system does not take it: there is no way to the address, or its buffer is full.
+    pub fn send(&self, payload: &[u8], to: SocketAddr) -> Result<(), UdpError> {
+        // A source has at least one port.
+        self.sockets[0].send(payload, to)
     }
 
     /// Looks once at every socket, beginning with the one whose turn it is.

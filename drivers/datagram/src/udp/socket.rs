@@ -82,6 +82,17 @@ impl Socket {
         }
     }
 
+    pub(super) fn send(&self, payload: &[u8], to: SocketAddr) -> Result<(), UdpError> {
+        loop {
+            // A datagram goes whole or not at all.
+            match self.inner.send_to(payload, to) {
+                Ok(_) => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(source) => return Err(UdpError::Send { to, source }),
+            }
+        }
+    }
+
     /// The next datagram if one is there. What does not fit in `buffer` is cut off; `len` tells.
     pub(super) fn receive(&mut self, buffer: &mut [u8]) -> Result<Option<Datagram>, UdpError> {
         loop {

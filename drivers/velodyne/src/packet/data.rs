@@ -363,15 +363,25 @@ struct Echo {
     reflectivity: u8,
 }
 
-impl Packet<'_> {
-    /// The 32 returns of a block, three bytes each.
-    fn returns(&self, block: usize) -> impl Iterator<Item = Echo> {
-        let start = block * BLOCK_LEN + 4;
-        let triples = self.bytes[start..start + CHANNELS * 3].as_chunks::<3>().0;
-        triples.iter().map(|triple| Echo {
+impl Echo {
+    fn read(triple: &[u8; 3]) -> Self {
+        Self {
             distance: u16::from_le_bytes([triple[0], triple[1]]),
             reflectivity: triple[2],
-        })
+        }
+    }
+}
+
+impl Packet<'_> {
+    /// The 32 returns of a block, three bytes each.
+    fn triples(&self, block: usize) -> &[[u8; 3]; CHANNELS] {
+        let start = block * BLOCK_LEN + 4;
+        let triples = self.bytes[start..].as_chunks::<3>().0.first_chunk();
+        triples.expect("every block has room for its returns")
+    }
+
+    fn returns(&self, block: usize) -> impl Iterator<Item = Echo> {
+        self.triples(block).iter().map(Echo::read)
     }
 
     fn decode_single(
@@ -408,21 +418,50 @@ impl Packet<'_> {
         let mut beams = Beams::new();
         let mut len = 0;
         for block in (0..BLOCKS).step_by(2) {
+            let [lasts, strongests] = [block, block + 1].map(|block| self.triples(block));
+            // Shots come back or not in an order that no branch could be predicted by: bits are
+            // collected first, and only shots that came back are looked at.
+            let mut hit = hit_channels(lasts, strongests);
+            if hit == 0 {
+                continue;
+            }
             let offset_ns = base_offset_ns.wrapping_add(block as u32 / 2 * BLOCK_PERIOD_NS);
             beams.aim(self.azimuths[block], self.steps[block], offset_ns, lasers);
-            let pairs = self.returns(block).zip(self.returns(block + 1));
-            for (j, (last, strongest)) in pairs.enumerate() {
-                let kinds = echo_kinds(last, strongest);
-                for (echo, kind) in [last, strongest].into_iter().zip(kinds) {
+            while hit != 0 {
+                let j = hit.trailing_zeros() as usize % CHANNELS;
+                hit &= hit - 1;
+                let (last, strongest) = (Echo::read(&lasts[j]), Echo::read(&strongests[j]));
+                let mut push = |echo, returned| {
+                    batch.points[len] = beams.point(j, echo, lasers, returned);
+                    len += 1;
+                };
+                // Nearly always.
+                if last == strongest {
+                    push(last, ReturnKind::StrongestAndLast);
+                    continue;
+                }
+                for (echo, kind) in [last, strongest]
+                    .into_iter()
+                    .zip(echo_kinds(last, strongest))
+                {
                     if let Some(returned) = kind {
-                        batch.points[len] = beams.point(j, echo, lasers, returned);
-                        len += 1;
+                        push(echo, returned);
                     }
                 }
             }
         }
         batch.len = len;
     }
+}
+
+/// A bit for each channel with an echo in either block of a pair.
+fn hit_channels(lasts: &[[u8; 3]; CHANNELS], strongests: &[[u8; 3]; CHANNELS]) -> u32 {
+    let mut bits = 0;
+    for (j, (last, strongest)) in lasts.iter().zip(strongests).enumerate() {
+        let distance = last[0] | last[1] | strongest[0] | strongest[1];
+        bits |= u32::from(distance != 0) << j;
+    }
+    bits
 }
 
 /// What the two slots of a dual shot hold; `None` for nothing, or nothing new.

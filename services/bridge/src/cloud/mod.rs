@@ -4,8 +4,8 @@
 //! all of them. Files and folders are opened in [`scans`](crate::scans); ROS messages are parsed
 //! in [`message`](crate::message).
 
+pub(crate) mod bare_rows;
 pub(crate) mod decode;
-pub(crate) mod kitti_bin;
 pub(crate) mod layout;
 mod lzf;
 pub(crate) mod pcd;
@@ -27,7 +27,7 @@ pub const MAX_POINTS: u64 = 1 << 26;
 /// A file format that holds one cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CloudFormat {
-    /// KITTI's bare rows: x, y, z, intensity as little-endian f32.
+    /// Bare rows of little-endian f32: x, y, z, intensity as KITTI has them, or x, y, z alone.
     Bin,
     /// The point cloud library's format: ascii, binary or binary_compressed.
     Pcd,
@@ -77,7 +77,7 @@ pub fn read_cloud_bytes(
 ) -> Result<CloudInfo, CloudError> {
     points.clear();
     match format {
-        CloudFormat::Bin => kitti_bin::read(bytes, decoder, points),
+        CloudFormat::Bin => bare_rows::read(bytes, decoder, points),
         CloudFormat::Pcd => pcd::read(bytes, decoder, points),
         CloudFormat::Ply => ply::read(bytes, decoder, points),
     }

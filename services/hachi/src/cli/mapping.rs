@@ -24,10 +24,14 @@ pub struct DemoArguments {
     /// The building, the walk and the noise: the same number gives the same bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Where the robot walks: office, glass-corridor, corridor, or stress (the office, with a
-    /// sensor that is carried in a hurry).
+    /// Where the robot walks: office, glass-corridor, corridor, stress (the office, with a sensor
+    /// that is carried in a hurry), building (corridors on a grid, five minutes), campus (streets
+    /// on rolling ground, 2.5 km in 21 minutes) or campus-long (20 km at 4 m/s).
     #[arg(long, value_name = "NAME", default_value = "office", value_parser = world)]
     pub world: Preset,
+    /// How far through the pipeline to go.
+    #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
+    pub stage: StageArgument,
     /// What it carries: vlp16, vlp16-dual or helios16p.
     #[arg(long, value_name = "NAME", default_value = "vlp16", value_parser = sensor)]
     pub sensor: SensorKind,
@@ -83,7 +87,7 @@ INPUT is a pcap or pcapng capture, a ROS 2 bag (db3, mcap), a ROS 1 bag, a KITTI
 folder of .bin, .pcd or .ply scans in numeric order with optional times.txt (seconds).
 
 Example:
-  hachi replay drive.pcap --out out/drive --stage odometry")]
+  hachi replay drive.pcap --out out/drive --stage slam --map drive.map")]
 pub struct ReplayArguments {
     /// The recording.
     #[arg(value_name = "INPUT")]
@@ -100,6 +104,9 @@ pub struct ReplayArguments {
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Odometry)]
     pub stage: StageArgument,
+    /// Keep the map in this file, or go on with the one that is there (with --stage slam).
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
     /// Threads to work with [default: one for each core]. The result does not depend on it.
     #[arg(long, value_name = "N")]
     pub threads: Option<NonZeroUsize>,
@@ -116,6 +123,8 @@ pub struct ReplayArguments {
 pub enum StageArgument {
     /// Scan by scan, without closing loops.
     Odometry,
+    /// With submaps, loops and a map that is optimised as a whole.
+    Slam,
 }
 
 /// Which filter takes reflections away.

@@ -1,12 +1,13 @@
 //! `hachi demo`: the simulated robot through the whole pipeline, compared with the truth.
 
 use hachi_bridge::message::Sensor;
+use hachi_slam::{MemoryStore, Slam};
 use hachi_trajectory::plot::Plot;
 use hachi_trajectory::{Alignment, Evaluation, EvaluationOptions, Trajectory, evaluate};
 use hachi_world::{SensorKind, SimulatedLidar, Simulation, SimulationConfig};
 use serde::Serialize;
 
-use crate::cli::mapping::DemoArguments;
+use crate::cli::mapping::{DemoArguments, StageArgument};
 use crate::config::MappingConfig;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
@@ -15,6 +16,7 @@ use crate::motion_samples::MotionSamples;
 use crate::recording::from_packets;
 use crate::report::{Report, RunState};
 use crate::results::Results;
+use crate::slam_stage::SlamStage;
 use crate::{output, progress};
 
 use super::replay::{first_failure, thread_pool};
@@ -33,6 +35,8 @@ struct DemoReport {
     /// Absolute trajectory error after SE(3) alignment, metres.
     ate_rmse_m: f64,
     ate_max_m: f64,
+    /// The same of odometry alone, without closing loops.
+    odometry_ate_rmse_m: f64,
     /// Error of the motion from one scan to the next, metres.
     rpe_rmse_m: f64,
     /// Error of the height, metres.
@@ -60,10 +64,15 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     };
     let lidar = SimulatedLidar::new(Simulation::new(world.clone()));
     let mut source = from_packets(driver, lidar, |_| Vec::new());
-    let mut mapping = Mapping::new(config)?;
+    let slam_config = config.slam.clone();
+    let mut mapping = Mapping::new(config, results.folder())?;
+    if arguments.stage == StageArgument::Slam {
+        let store = Box::new(MemoryStore::default());
+        mapping = mapping.with_slam(Slam::new(slam_config, store));
+    }
 
     let pool = thread_pool(None)?;
-    let (ended, mut report) = pool.install(|| {
+    let (ended, finished, mut report) = pool.install(|| {
         let mut motion = MotionSamples::default();
         let ended = run_mapping(
             &mut mapping,
@@ -73,9 +82,11 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
             &bar,
             |_, _, _| (),
         );
-        (ended, mapping.report())
+        let finished = mapping.finish();
+        (ended, finished, mapping.report())
     });
     bar.finish_and_clear();
+    finished?;
     for (reason, count) in source.dropped() {
         report.drop_for(&reason, count);
     }
@@ -102,6 +113,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         seed: arguments.seed,
         ate_rmse_m: measured.ape.rmse,
         ate_max_m: measured.ape.max,
+        odometry_ate_rmse_m: measure(&truth, &mapping.odometry()).map_or(0.0, |e| e.ape.rmse),
         rpe_rmse_m: measured.rpe.map_or(0.0, |rpe| rpe.rmse),
         z_rmse_m: height_error(&measured),
         true_path_length_m: truth.path_length_m(),
@@ -179,20 +191,22 @@ fn write_all(
         truth.path_length_m(),
         measured.ape.rmse * 100.0
     );
+    let loops = mapping.slam().map_or_else(Vec::new, SlamStage::loop_lines);
     let picture = Plot {
         title: "Simulated building: estimate and truth",
         subtitle: &subtitle,
         estimate: &measured.estimate,
         reference: Some(&measured.reference),
         errors_m: Some(&measured.errors_m),
+        links: &loops,
     };
     first_failure([
         results.trajectory("trajectory.tum", trajectory),
-        results.trajectory("odometry.tum", trajectory),
+        results.trajectory("odometry.tum", &mapping.odometry()),
         results.trajectory("truth.tum", truth),
         results.picture(&picture),
         results.map(mapping.map(), trajectory),
-        results.no_loops(),
+        results.loops(mapping.slam()),
     ])
 }
 
@@ -201,9 +215,9 @@ fn summary(demo: &DemoReport, mapping: &Mapping, results: &Results) -> String {
     let times = &report.total_per_scan_ms;
     format!(
         "{} on a walking robot, {} building {}: {} scans, {:.1} s, {:.1} m\n\
-         error against the truth {:.1} cm rmse, {:.1} cm at most\n\
+         error against the truth {:.1} cm rmse, {:.1} cm at most; {:.1} cm rmse by odometry alone\n\
          {:.1} ms a scan in the mean, {:.1} ms at the 99th percentile, {} threads\n\
-         condition OK {}, DEGRADED {}, LOST {}\n\
+         condition OK {}, DEGRADED {}, LOST {}; {} of {} loop candidates closed\n\
          look at {} and {} ({} points)",
         demo.sensor,
         demo.world,
@@ -213,12 +227,15 @@ fn summary(demo: &DemoReport, mapping: &Mapping, results: &Results) -> String {
         demo.true_path_length_m,
         demo.ate_rmse_m * 100.0,
         demo.ate_max_m * 100.0,
+        demo.odometry_ate_rmse_m * 100.0,
         times.mean_ms,
         times.p99_ms,
         report.threads,
         report.conditions.ok,
         report.conditions.degraded,
         report.conditions.lost,
+        report.loops.accepted,
+        report.loops.candidates,
         results.path("trajectory.svg").display(),
         results.path("map.ply").display(),
         mapping.map().len(),

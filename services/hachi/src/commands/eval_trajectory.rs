@@ -120,6 +120,7 @@ fn draw(
         estimate: &evaluation.estimate,
         reference: Some(reference),
         errors_m: Some(&evaluation.errors_m),
+        links: &[],
     }
     .to_svg()
     .map_err(|error| Failure::new(error, "check the positions in both files"))?;

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use hachi_slam::{MemoryStore, Slam};
 use hachi_trajectory::plot::Plot;
 
-use crate::cli::mapping::ReplayArguments;
+use crate::cli::mapping::{ReplayArguments, StageArgument};
 use crate::config::MappingConfig;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
@@ -12,7 +13,7 @@ use crate::mapping::{Ended, Mapping, run as run_mapping, state_of};
 use crate::motion_samples::MotionSamples;
 use crate::report::{Report, RunState};
 use crate::results::Results;
-use crate::{output, progress, recording};
+use crate::{output, progress, recording, saved_maps};
 
 /// Runs the command.
 ///
@@ -30,10 +31,17 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let results = Results::create_for(&arguments.input, &arguments.out)?;
     let cancelled = Cancelled::on_interrupt()?;
     let bar = progress::bar(source.scan_count(), "scans");
-    let mut mapping = Mapping::new(config)?;
+    let slam = match arguments.stage {
+        StageArgument::Odometry => None,
+        StageArgument::Slam => Some(slam(arguments, &config)?),
+    };
+    let mut mapping = Mapping::new(config, results.folder())?;
+    if let Some(slam) = slam {
+        mapping = mapping.with_slam(slam);
+    }
 
     let pool = thread_pool(arguments.threads.map(|n| n.get()))?;
-    let (ended, mut report) = pool.install(|| {
+    let (ended, finished, mut report) = pool.install(|| {
         let ended = run_mapping(
             &mut mapping,
             &mut *source,
@@ -42,10 +50,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
             &bar,
             |_, _, _| (),
         );
-        let report = mapping.report();
-        (ended, report)
+        let finished = mapping.finish();
+        (ended, finished, mapping.report())
     });
     bar.finish_and_clear();
+    finished?;
 
     for (reason, count) in source.dropped() {
         report.drop_for(&reason, count);
@@ -58,6 +67,17 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         output::text(&summary(&report, &mapping, &results))?;
     }
     conclude(ended, &report, &arguments.input)
+}
+
+/// SLAM, with a map in memory or in the file that the user named: begun there, or gone on with.
+fn slam(arguments: &ReplayArguments, config: &MappingConfig) -> Result<Slam, Failure> {
+    let settings = config.slam.clone();
+    let Some(path) = &arguments.map else {
+        return Ok(Slam::new(settings, Box::new(MemoryStore::default())));
+    };
+    let (file, saved) = saved_maps::go_on(path, arguments.platform.as_deref())?;
+    Slam::resume(settings, saved, Box::new(file))
+        .map_err(|error| Failure::new(error, "restore the map from a copy, or map anew"))
 }
 
 /// A pool of this many threads; one for each core if unset.
@@ -82,8 +102,15 @@ pub fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Failure>
 /// The first that can't be written.
 fn write_all(results: &Results, mapping: &Mapping, report: &mut Report) -> Result<(), Failure> {
     let trajectory = mapping.trajectory();
+    let (how, loops) = match mapping.slam() {
+        Some(slam) => (
+            format!("{} loops closed", report.loops.accepted),
+            slam.loop_lines(),
+        ),
+        None => ("odometry alone".to_owned(), Vec::new()),
+    };
     let subtitle = format!(
-        "{} scans, {:.1} m, odometry alone",
+        "{} scans, {:.1} m, {how}",
         report.scans, report.path_length_m
     );
     let picture = Plot {
@@ -92,13 +119,14 @@ fn write_all(results: &Results, mapping: &Mapping, report: &mut Report) -> Resul
         estimate: trajectory,
         reference: None,
         errors_m: None,
+        links: &loops,
     };
     let written = first_failure([
         results.trajectory("trajectory.tum", trajectory),
-        results.trajectory("odometry.tum", trajectory),
+        results.trajectory("odometry.tum", &mapping.odometry()),
         results.picture(&picture),
         results.map(mapping.map(), trajectory),
-        results.no_loops(),
+        results.loops(mapping.slam()),
     ]);
     if written.is_err() {
         report.state = RunState::OutputFailed;
@@ -138,7 +166,7 @@ fn summary(report: &Report, mapping: &Mapping, results: &Results) -> String {
     format!(
         "{} scans in {:.1} s, path {:.2} m\n\
          {:.1} ms a scan in the mean, {:.1} ms at the 99th percentile, {} threads\n\
-         condition OK {}, DEGRADED {}, LOST {}\n\
+         condition OK {}, DEGRADED {}, LOST {}; {} of {} loop candidates closed\n\
          map of {} points, trajectory and report in {}",
         report.scans,
         report.duration_s,
@@ -149,6 +177,8 @@ fn summary(report: &Report, mapping: &Mapping, results: &Results) -> String {
         conditions.ok,
         conditions.degraded,
         conditions.lost,
+        report.loops.accepted,
+        report.loops.candidates,
         mapping.map().len(),
         results.path("").display(),
     )

@@ -107,11 +107,11 @@ fn tile<S: Simd, const R: usize, const C: usize>(
 ) {
     let lanes = S::F64_LANES;
     let sums = sums::<S, R, C>(simd, done, rows, i, j);
-    for c in 0..C {
+    for (c, sums) in sums.iter().enumerate() {
         let begin = c * rows + i;
         let target = S::as_mut_simd_f64s(&mut target[begin..begin + R * lanes]).0;
         for k in 0..R {
-            target[k] = simd.sub_f64s(target[k], sums[c][k]);
+            target[k] = simd.sub_f64s(target[k], sums[k]);
         }
     }
 }

@@ -6,6 +6,8 @@ use plotters::style::RGBColor;
 pub(super) const REFERENCE: RGBColor = RGBColor(150, 150, 150);
 /// The estimate's line where no errors colour it.
 pub(super) const ESTIMATE: RGBColor = RGBColor(33, 102, 172);
+/// Lines between places that were recognised.
+pub(super) const LINK: RGBColor = RGBColor(230, 120, 20);
 /// Text.
 pub(super) const TEXT: RGBColor = RGBColor(40, 40, 40);
 /// Grid lines.

@@ -31,6 +31,7 @@ pub(super) struct Canvas<'a> {
     pub(super) estimate: &'a [Vector3],
     pub(super) reference: &'a [Vector3],
     pub(super) errors: Option<&'a [f64]>,
+    pub(super) links: &'a [(Vector3, Vector3)],
 }
 
 /// What the panels along the way have to the right: seconds since the start, or poses.
@@ -101,7 +102,11 @@ impl Canvas<'_> {
                 "estimate"
             },
             colour::ESTIMATE,
-        )
+        )?;
+        if !self.links.is_empty() {
+            entry("loops", colour::LINK)?;
+        }
+        Ok(())
     }
 
     /// The path from above.
@@ -124,6 +129,7 @@ impl Canvas<'_> {
             Some(errors) => self.coloured_line(&mut chart, errors)?,
             None => self.line(&mut chart, self.estimate, colour::ESTIMATE)?,
         }
+        self.links(&mut chart)?;
         self.marks(&mut chart)?;
         match self.errors {
             Some(errors) => colour_scale(area, largest(errors)),
@@ -203,6 +209,18 @@ impl Canvas<'_> {
             let piece: Vec<(f64, f64)> = points[begin..=end].iter().map(|p| p.0).collect();
             polyline(chart, &piece, colour::of_step(step))?;
             begin = end;
+        }
+        Ok(())
+    }
+
+    /// Places that were recognised.
+    fn links(&self, chart: &mut Chart<'_, '_>) -> Result<(), PlotError> {
+        let kept = thin::indices(self.links.len()).map(|i| self.links[i]);
+        for (from, to) in kept {
+            if let (Some(from), Some(to)) = (self.view.on_page(&from), self.view.on_page(&to)) {
+                let line = PathElement::new([from, to], colour::LINK.stroke_width(1));
+                chart.plotting_area().draw(&line).map_err(drawing)?;
+            }
         }
         Ok(())
     }

@@ -7,9 +7,12 @@ mod furniture;
 mod glass;
 mod office;
 mod ring;
+mod rooms;
+mod storey;
 
 pub(crate) use glass::glass_corridor;
 pub(crate) use office::office;
+pub(crate) use storey::storey;
 
 use crate::material::Material;
 use crate::scene::ObjectId;

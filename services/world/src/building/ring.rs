@@ -81,6 +81,11 @@ impl Ring {
             0.0,
             Material::CEILING,
         );
+        self.lamps(builder);
+    }
+
+    /// Lamps along the corridor's ceiling.
+    pub fn lamps(&self, builder: &mut SceneBuilder) {
         for i in 0..4 {
             let side = self.inner(i);
             let lamps = (self.length(i) / 3.0) as usize;
