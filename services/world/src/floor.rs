@@ -54,17 +54,17 @@ pub struct Wave {
     pub amplitude_m: f64,
     /// From crest to crest, metres.
     pub length_m: f64,
-    /// Direction in which it runs, radians, x towards y.
-    pub heading_rad: f64,
+    /// Direction in which it runs, a unit vector.
+    pub along: [f64; 2],
     /// Phase at the origin, radians.
     pub phase_rad: f64,
 }
 
 impl Wave {
     fn height(&self, x: f64, y: f64) -> f64 {
-        let (sin, cos) = self.heading_rad.sin_cos();
-        let along = (x * cos + y * sin) / self.length_m;
-        self.amplitude_m * (std::f64::consts::TAU * along + self.phase_rad).sin()
+        let along = x * self.along[0] + y * self.along[1];
+        let turn = std::f64::consts::TAU / self.length_m * along + self.phase_rad;
+        self.amplitude_m * turn.sin()
     }
 }
 
@@ -136,7 +136,7 @@ mod tests {
             waves: vec![Wave {
                 amplitude_m: 1.5,
                 length_m: 120.0,
-                heading_rad: 0.0,
+                along: [1.0, 0.0],
                 phase_rad: 0.0,
             }],
             level_m: 8.0,

@@ -278,14 +278,14 @@ mod tests {
     use crate::floor::Wave;
 
     fn rolling() -> Terrain {
-        let wave = |amplitude_m, length_m, heading_rad: f64| Wave {
+        let wave = |amplitude_m, length_m, along: [f64; 2]| Wave {
             amplitude_m,
             length_m,
-            heading_rad,
+            along,
             phase_rad: 1.0,
         };
         Terrain {
-            waves: vec![wave(1.5, 120.0, 0.3), wave(0.5, 70.0, 1.9)],
+            waves: vec![wave(1.5, 120.0, [0.96, 0.28]), wave(0.5, 70.0, [-0.6, 0.8])],
             level_m: 8.0,
             blend_m: 30.0,
         }

@@ -28,10 +28,12 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod aim;
 mod building;
 mod calendar;
 mod campus;
 pub mod capture;
+mod fan;
 pub mod floor;
 mod ground;
 mod helios;

@@ -20,12 +20,22 @@ pub(crate) fn generator(seed: u64, purpose: Purpose, index: u64) -> ChaCha8Rng {
     generator
 }
 
-/// Two independent normal deviates, by Box and Muller's method.
-pub(crate) fn normal_pair(generator: &mut ChaCha8Rng) -> [f64; 2] {
+/// Two numbers in [0, 1), to make [`normals`] from where they are needed.
+pub(crate) fn uniform_pair(generator: &mut ChaCha8Rng) -> [f64; 2] {
+    [generator.random(), generator.random()]
+}
+
+/// Two independent normal deviates from two uniform ones, by Box and Muller's method.
+pub(crate) fn normals([u, v]: [f64; 2]) -> [f64; 2] {
     // In (0, 1], so that the logarithm is finite.
-    let radius = (-2.0 * (1.0 - generator.random::<f64>()).ln()).sqrt();
-    let (sin, cos) = (std::f64::consts::TAU * generator.random::<f64>()).sin_cos();
+    let radius = (-2.0 * (1.0 - u).ln()).sqrt();
+    let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
     [radius * cos, radius * sin]
+}
+
+/// Two independent normal deviates.
+pub(crate) fn normal_pair(generator: &mut ChaCha8Rng) -> [f64; 2] {
+    normals(uniform_pair(generator))
 }
 
 /// Three independent normal deviates.

@@ -15,7 +15,7 @@ use parry3d::math::Vector;
 use parry3d::query::Ray;
 
 use crate::material::{Finish, Material, mirrored_share};
-use crate::scene::{ObjectId, Role, Scene};
+use crate::scene::{Hit, ObjectId, Role, Scene};
 
 /// What a return truly is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -186,17 +186,20 @@ pub(crate) enum Wanted {
     Strongest,
 }
 
-/// Adds the echoes of a pulse of strength `gain` within `max_range` to `echoes`.
+/// Adds the echoes of a pulse of strength `gain` within `max_range` to `echoes`. `first_hit` is
+/// what the pulse hits first within that range.
 pub(crate) fn trace(
     scene: &Scene,
     ray: Ray,
+    first_hit: Option<Hit>,
     gain: f32,
     max_range: f32,
     wanted: Wanted,
     echoes: &mut Echoes,
 ) {
-    // Half the least power is the least that luck lets a sensor detect.
-    let mut to_beat = MIN_POWER / 2.0;
+    let Some(hit) = first_hit else {
+        return;
+    };
     let first = Branch {
         ray,
         travelled: 0.0,
@@ -205,111 +208,145 @@ pub(crate) fn trace(
         seen: Seen::Straight,
         depth: 0,
     };
+    let mut met = (first, hit, scatter(scene, &first, &hit));
+    echoes.push(met.2.echo);
+    // Half the least power is the least that luck lets a sensor detect.
+    let mut to_beat = MIN_POWER / 2.0;
+    if met.2.mirrored == 0.0 && met.2.passed == 0.0 {
+        return;
+    }
     // Each branch adds at most two and takes one away, MAX_DEPTH deep.
     let mut stack = [first; MAX_DEPTH as usize + 2];
-    let mut waiting = 1;
-    while waiting > 0 {
-        waiting -= 1;
-        let branch = stack[waiting];
-        // Whatever this branch meets is at least so far away and at best so bright.
-        let best = branch.gain * scene.brightest() / (branch.travelled * branch.travelled);
-        if best < to_beat {
-            continue;
+    let mut waiting = 0;
+    loop {
+        let (branch, hit, scattered) = &met;
+        if wanted == Wanted::Strongest && scattered.echo.distance >= MIN_RANGE_M {
+            to_beat = to_beat.max(scattered.echo.power);
         }
-        let within = max_range - branch.travelled;
-        let Some(hit) = scene.cast(&branch.ray, within, branch.ignore) else {
-            continue;
-        };
-        let object = scene.object(hit.object);
-        let material = &object.material;
-        let distance = branch.travelled + hit.distance;
-        let cosine = hit.normal.dot(branch.ray.dir).abs().min(1.0);
-        let (mirrored, passed, plain) = match material.finish {
-            Finish::Matte | Finish::Retroreflective => (0.0, 0.0, ReturnLabel::Direct),
-            Finish::Polished { mirrored } => {
-                (mirrored_share(mirrored, cosine), 0.0, ReturnLabel::Direct)
+        if branch.depth < MAX_DEPTH {
+            for next in onward(scene, branch, hit, scattered) {
+                if next.gain > MIN_GAIN {
+                    stack[waiting] = next;
+                    waiting += 1;
+                }
             }
-            Finish::Glass { mirrored, absorbed } => {
-                let mirrored = mirrored_share(mirrored, cosine);
-                (
-                    mirrored,
-                    (1.0 - mirrored - absorbed).max(0.0),
-                    ReturnLabel::GlassSurface,
-                )
-            }
-        };
-        let plain = match object.role {
-            Role::Floor => ReturnLabel::Floor,
-            Role::Structure => plain,
-        };
-        let scattered = if material.is_glass() {
-            let angle = cosine.acos() / GLINT_WIDTH;
-            material.reflectivity * (-angle * angle).exp() + DUST
-        } else {
-            material.reflectivity * cosine.powf(material.incidence_exponent) * (1.0 - mirrored)
-        };
-        let (power, intensity) = match material.finish {
-            // The manual puts an ideal retro-reflector at 255 and the least of them above 100.
-            Finish::Retroreflective => (
-                RETRO_GAIN * scattered,
-                100.0 + 155.0 * branch.gain * scattered,
-            ),
-            _ => (scattered, 100.0 * branch.gain * scattered),
-        };
-        let power = branch.gain * power / (distance * distance).max(0.01);
-        if wanted == Wanted::Strongest && distance >= MIN_RANGE_M {
-            to_beat = to_beat.max(power);
         }
-        echoes.push(Echo {
+        met = loop {
+            if waiting == 0 {
+                return;
+            }
+            waiting -= 1;
+            let branch = stack[waiting];
+            // Whatever this branch meets is at least so far away and at best so bright.
+            let best = branch.gain * scene.brightest() / (branch.travelled * branch.travelled);
+            if best < to_beat {
+                continue;
+            }
+            let within = max_range - branch.travelled;
+            if let Some(hit) = scene.cast(&branch.ray, within, branch.ignore) {
+                break (branch, hit, scatter(scene, &branch, &hit));
+            }
+        };
+        echoes.push(met.2.echo);
+    }
+}
+
+/// What becomes of a branch at a surface.
+#[derive(Clone, Copy)]
+struct Scattered {
+    echo: Echo,
+    /// Shares of its light.
+    mirrored: f32,
+    passed: f32,
+}
+
+fn scatter(scene: &Scene, branch: &Branch, hit: &Hit) -> Scattered {
+    let object = scene.object(hit.object);
+    let material = &object.material;
+    let distance = branch.travelled + hit.distance;
+    let cosine = hit.normal.dot(branch.ray.dir).abs().min(1.0);
+    let (mirrored, passed, plain) = match material.finish {
+        Finish::Matte | Finish::Retroreflective => (0.0, 0.0, ReturnLabel::Direct),
+        Finish::Polished { mirrored } => {
+            (mirrored_share(mirrored, cosine), 0.0, ReturnLabel::Direct)
+        }
+        Finish::Glass { mirrored, absorbed } => {
+            let mirrored = mirrored_share(mirrored, cosine);
+            (
+                mirrored,
+                (1.0 - mirrored - absorbed).max(0.0),
+                ReturnLabel::GlassSurface,
+            )
+        }
+    };
+    let plain = match object.role {
+        Role::Floor => ReturnLabel::Floor,
+        Role::Structure => plain,
+    };
+    let scattered = if material.is_glass() {
+        let angle = cosine.acos() / GLINT_WIDTH;
+        material.reflectivity * (-angle * angle).exp() + DUST
+    } else {
+        material.reflectivity * cosine.powf(material.incidence_exponent) * (1.0 - mirrored)
+    };
+    let (power, intensity) = match material.finish {
+        // The manual puts an ideal retro-reflector at 255 and the least of them above 100.
+        Finish::Retroreflective => (
+            RETRO_GAIN * scattered,
+            100.0 + 155.0 * branch.gain * scattered,
+        ),
+        _ => (scattered, 100.0 * branch.gain * scattered),
+    };
+    Scattered {
+        echo: Echo {
             distance,
-            power,
+            power: branch.gain * power / (distance * distance).max(0.01),
             intensity,
             label: branch.seen.label(plain),
             object: hit.object,
-        });
-        if branch.depth == MAX_DEPTH {
-            continue;
-        }
-        let point = branch.ray.point_at(hit.distance);
-        let next = Branch {
-            travelled: distance,
-            ignore: Some(hit.object),
-            depth: branch.depth + 1,
-            ..branch
-        };
-        let mirror = Branch {
-            ray: Ray::new(
-                point,
-                branch.ray.dir - hit.normal * (2.0 * hit.normal.dot(branch.ray.dir)),
-            ),
-            gain: branch.gain * mirrored * mirrored,
-            seen: match (branch.seen, object.role) {
-                (Seen::InGlass, _) | (_, Role::Structure) => Seen::InGlass,
-                (_, Role::Floor) => Seen::InFloor,
-            },
-            ..next
-        };
-        let beyond = Branch {
-            ray: Ray::new(point, branch.ray.dir),
-            gain: branch.gain * passed * passed,
-            seen: match branch.seen {
-                Seen::Straight => Seen::ThroughGlass,
-                seen => seen,
-            },
-            ..next
-        };
-        // The stronger is followed first.
-        let pair = if mirror.gain > beyond.gain {
-            [beyond, mirror]
-        } else {
-            [mirror, beyond]
-        };
-        for branch in pair {
-            if branch.gain > MIN_GAIN {
-                stack[waiting] = branch;
-                waiting += 1;
-            }
-        }
+        },
+        mirrored,
+        passed,
+    }
+}
+
+/// Where the light goes on from a surface, in the mirror and beyond it, the stronger branch last:
+/// it is followed first.
+fn onward(scene: &Scene, branch: &Branch, hit: &Hit, scattered: &Scattered) -> [Branch; 2] {
+    let (mirrored, passed) = (scattered.mirrored, scattered.passed);
+    let role = scene.object(hit.object).role;
+    let point = branch.ray.point_at(hit.distance);
+    let next = Branch {
+        travelled: scattered.echo.distance,
+        ignore: Some(hit.object),
+        depth: branch.depth + 1,
+        ..*branch
+    };
+    let mirror = Branch {
+        ray: Ray::new(
+            point,
+            branch.ray.dir - hit.normal * (2.0 * hit.normal.dot(branch.ray.dir)),
+        ),
+        gain: branch.gain * mirrored * mirrored,
+        seen: match (branch.seen, role) {
+            (Seen::InGlass, _) | (_, Role::Structure) => Seen::InGlass,
+            (_, Role::Floor) => Seen::InFloor,
+        },
+        ..next
+    };
+    let beyond = Branch {
+        ray: Ray::new(point, branch.ray.dir),
+        gain: branch.gain * passed * passed,
+        seen: match branch.seen {
+            Seen::Straight => Seen::ThroughGlass,
+            seen => seen,
+        },
+        ..next
+    };
+    if mirror.gain > beyond.gain {
+        [beyond, mirror]
+    } else {
+        [mirror, beyond]
     }
 }
 
@@ -326,14 +363,9 @@ mod tests {
 
     fn echoes_of(scene: &Scene, origin: [f64; 3], direction: [f64; 3]) -> Vec<Echo> {
         let mut echoes = Echoes::new();
-        trace(
-            scene,
-            beam(origin, direction),
-            1.0,
-            100.0,
-            Wanted::Every,
-            &mut echoes,
-        );
+        let ray = beam(origin, direction);
+        let hit = scene.cast(&ray, 100.0, None);
+        trace(scene, ray, hit, 1.0, 100.0, Wanted::Every, &mut echoes);
         echoes.as_slice().to_vec()
     }
 
@@ -415,7 +447,8 @@ mod tests {
             let ray = beam([1.0, 0.1, 0.6], [azimuth.cos(), azimuth.sin(), up]);
             let dir = ray.dir.normalize();
             let ray = Ray::new(ray.origin, dir);
-            trace(&world.scene, ray, 1.0, 100.0, wanted, &mut echoes);
+            let hit = world.scene.cast(&ray, 100.0, None);
+            trace(&world.scene, ray, hit, 1.0, 100.0, wanted, &mut echoes);
             echoes
                 .as_slice()
                 .iter()

@@ -6,7 +6,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::noise::{Purpose, generator};
+use crate::noise::{Purpose, generator, normals};
 use crate::optics::{Echo, MIN_POWER, MIN_RANGE_M, ReturnLabel};
 use crate::scene::ObjectId;
 use crate::sensor::MAX_RANGE_M;
@@ -79,20 +79,21 @@ pub(crate) fn dual_of(echoes: &[Echo], threshold: f32) -> (Option<Echo>, Option<
 }
 
 /// How this shot's echoes are distorted.
-pub(crate) struct Measurement {
+pub(crate) struct Measurement<'a> {
     unit_m: f64,
-    range_error_m: f64,
-    intensity_factor: f64,
+    noise: &'a NoiseConfig,
+    /// Uniform numbers, of which normal ones are made only if there is something to report.
+    luck: [f64; 2],
     /// Least power that this shot detects.
     pub threshold: f32,
 }
 
-impl Measurement {
-    pub fn of(unit_m: f64, noise: &NoiseConfig, normal: [f64; 2], fading: f32) -> Self {
+impl<'a> Measurement<'a> {
+    pub fn of(unit_m: f64, noise: &'a NoiseConfig, luck: [f64; 2], fading: f32) -> Self {
         Self {
             unit_m,
-            range_error_m: noise.range_sigma_m * normal[0],
-            intensity_factor: 1.0 + noise.intensity_sigma * normal[1],
+            noise,
+            luck,
             // Around the threshold detection is a matter of luck: half to one and a half.
             threshold: MIN_POWER * (0.5 + fading),
         }
@@ -102,8 +103,11 @@ impl Measurement {
         let Some(echo) = echo else {
             return Default::default();
         };
-        let counts = (f64::from(echo.distance) + self.range_error_m) / self.unit_m;
-        let intensity = (f64::from(echo.intensity) * self.intensity_factor).round();
+        let [range, intensity] = normals(self.luck);
+        let range_error_m = self.noise.range_sigma_m * range;
+        let intensity_factor = 1.0 + self.noise.intensity_sigma * intensity;
+        let counts = (f64::from(echo.distance) + range_error_m) / self.unit_m;
+        let intensity = (f64::from(echo.intensity) * intensity_factor).round();
         let report = Report {
             distance: counts.round().clamp(1.0, 65_535.0) as u16,
             intensity: intensity.clamp(0.0, 255.0) as u8,

@@ -13,6 +13,7 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Cuboid, Triangle};
 
+use crate::fan::{self, Scratch};
 use crate::floor::Floor;
 use crate::ground::Ground;
 use crate::material::Material;
@@ -80,7 +81,7 @@ impl Shape {
         }
     }
 
-    fn distance(&self, ray: &Ray, within: f32) -> Option<f32> {
+    pub fn distance(&self, ray: &Ray, within: f32) -> Option<f32> {
         match self {
             Self::AxisBox(bounds) => bounds.cast_local_ray(ray, within, true),
             Self::Box {
@@ -100,7 +101,7 @@ impl Shape {
     /// The normal where the ray hits; zero if it starts inside or misses.
     fn normal(&self, ray: &Ray, within: f32) -> Vector {
         let hit = match self {
-            Self::AxisBox(bounds) => bounds.cast_local_ray_and_get_normal(ray, within, true),
+            Self::AxisBox(bounds) => return box_normal(bounds, ray),
             Self::Box {
                 world_from_box,
                 cuboid,
@@ -122,6 +123,25 @@ impl Shape {
         };
         hit.map_or(Vector::ZERO, |hit| hit.normal)
     }
+}
+
+/// The normal of the face by which a ray enters a box: that of the axis it gets between the faces of
+/// last. Zero if the ray starts inside.
+fn box_normal(bounds: &Aabb, ray: &Ray) -> Vector {
+    let (origin, dir) = (ray.origin.to_array(), ray.dir.to_array());
+    let (low, high) = (bounds.mins.to_array(), bounds.maxs.to_array());
+    let (mut last, mut normal) = (0.0, [0.0; 3]);
+    for axis in 0..3 {
+        if dir[axis] != 0.0 {
+            let face = if dir[axis] > 0.0 { low } else { high }[axis];
+            let enters = (face - origin[axis]) * (1.0 / dir[axis]);
+            if enters > last {
+                (last, normal) = (enters, [0.0; 3]);
+                normal[axis] = -dir[axis].signum();
+            }
+        }
+    }
+    Vector::from(normal)
 }
 
 /// Distance at which a ray from outside enters a ball.
@@ -172,6 +192,17 @@ fn cylinder_hit(base: Vector, radius: f32, height: f32, ray: &Ray) -> Option<(f3
 pub(crate) struct Primitive {
     pub shape: Shape,
     pub object: ObjectId,
+    pub bounds: Aabb,
+}
+
+impl Primitive {
+    pub fn new(shape: Shape, object: ObjectId) -> Self {
+        Self {
+            bounds: shape.bounds(),
+            shape,
+            object,
+        }
+    }
 }
 
 /// Where a ray met something.
@@ -203,7 +234,7 @@ impl Scene {
     ) -> Self {
         let bounds: Vec<Aabb> = primitives
             .iter()
-            .map(|primitive| primitive.shape.bounds())
+            .map(|primitive| primitive.bounds)
             .collect();
         Self {
             brightest: objects
@@ -236,15 +267,56 @@ impl Scene {
             }
             primitive.shape.distance(ray, best)
         });
-        let Some((index, distance)) = nearest else {
-            return ground;
-        };
+        match nearest {
+            Some((index, distance)) => Some(self.hit_on(index, ray, distance)),
+            None => ground,
+        }
+    }
+
+    /// As [`cast`](Self::cast) for each of the rays, passing by nothing: they come in fans, see
+    /// `fan`. Their hits are put in the place of what is in `hits`.
+    pub(crate) fn cast_fans(
+        &self,
+        rays: &[Ray],
+        within: f32,
+        scratch: &mut Scratch,
+        hits: &mut Vec<Option<Hit>>,
+    ) {
+        hits.clear();
+        hits.extend(
+            rays.iter()
+                .map(|ray| self.ground.as_ref()?.cast(ray, within)),
+        );
+        let nearest = &mut scratch.nearest;
+        nearest.distances.clear();
+        let reaches = hits
+            .iter()
+            .map(|hit| hit.map_or(within, |hit| hit.distance));
+        nearest.distances.extend(reaches);
+        nearest.primitives.clear();
+        nearest.primitives.resize(rays.len(), None);
+        if fan::cast(&self.tree, &self.primitives, rays, scratch) {
+            let nearest = &scratch.nearest;
+            let found = nearest.primitives.iter().zip(&nearest.distances);
+            for ((hit, ray), (number, distance)) in hits.iter_mut().zip(rays).zip(found) {
+                if let Some(number) = number {
+                    *hit = Some(self.hit_on(*number, ray, *distance));
+                }
+            }
+        } else {
+            for (hit, ray) in hits.iter_mut().zip(rays) {
+                *hit = self.cast(ray, within, None);
+            }
+        }
+    }
+
+    fn hit_on(&self, index: u32, ray: &Ray, distance: f32) -> Hit {
         let primitive = &self.primitives[index as usize];
-        Some(Hit {
+        Hit {
             distance,
             normal: primitive.shape.normal(ray, f32::MAX),
             object: primitive.object,
-        })
+        }
     }
 
     pub(crate) fn object(&self, id: ObjectId) -> &Object {

@@ -31,7 +31,7 @@ impl SceneBuilder {
     }
 
     fn part(&mut self, object: ObjectId, shape: Shape) {
-        self.primitives.push(Primitive { shape, object });
+        self.primitives.push(Primitive::new(shape, object));
     }
 
     /// A box of edges `size` around `centre`, turned by `yaw` radians about the vertical.

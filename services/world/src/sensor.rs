@@ -1,20 +1,23 @@
-//! What the sensors have in common: from a packet's number to its firings, beams and returns.
+//! What the sensors have in common: from a packet's number to its firings and returns.
 //!
 //! In: the scene, the trajectory, the packet's number. Out: the packet's bytes and, for each
 //! channel, the truth. A packet depends on nothing but these and the seed, so packets can be made
-//! in any order and on any thread. Elsewhere: byte layouts (`vlp16`, `helios`), echoes
-//! (`optics`), what is reported of them (`returns`).
+//! in any order and on any thread. Elsewhere: byte layouts (`vlp16`, `helios`), where the beams
+//! go (`aim`), echoes (`optics`), what is reported of them (`returns`).
 
 use std::f64::consts::TAU;
 
-use hachi_hal::{Pose, Stamp};
+use hachi_hal::Stamp;
+use parry3d::query::Ray;
 use rand::RngExt;
 
+use crate::aim::{Head, LASERS};
 use crate::calendar::Utc;
-use crate::noise::{Purpose, generator, normal_pair};
-use crate::optics::{Echoes, Wanted, beam, trace};
+use crate::fan::Scratch;
+use crate::noise::{Purpose, generator, uniform_pair};
+use crate::optics::{Echoes, trace};
 use crate::returns::{Measurement, Report, ReturnTruth, Strays, dual_of, strongest_of};
-use crate::scene::Scene;
+use crate::scene::Hit;
 use crate::simulation::SimulationConfig;
 use crate::{helios, vlp16};
 
@@ -40,12 +43,9 @@ pub(crate) struct Firing {
 }
 
 /// The head turns 10 times a second.
-const TURN_NS: i64 = 100_000_000;
+pub(crate) const TURN_NS: i64 = 100_000_000;
 /// Nor from farther: VLP-16 data sheet, 100 m, and the Helios' 16-bit distances reach 163 m.
 pub(crate) const MAX_RANGE_M: f32 = 100.0;
-/// Half the distance between the two halves of a beam at its divergence of 3 mrad (VLP-16
-/// manual), radians: at edges they see two things.
-const HALF_BEAM_RAD: f64 = 0.000_75;
 /// After the last firing, the packet is on its way for this long, ns.
 const TRANSPORT_NS: i64 = 50_000;
 
@@ -123,7 +123,7 @@ impl SensorKind {
         }
     }
 
-    fn firing(self, group: usize, laser: usize) -> Firing {
+    pub(crate) fn firing(self, group: usize, laser: usize) -> Firing {
         match self {
             Self::Vlp16 | Self::Vlp16Dual => vlp16::firing(group, laser),
             Self::Helios16P => helios::firing(group / 2, 16 * (group % 2) + laser),
@@ -168,6 +168,15 @@ pub(crate) struct DataPacket {
     pub len: usize,
     pub received: Stamp,
     pub truth: [ReturnTruth; 384],
+    casting: Casting,
+}
+
+/// Room for the casting of rays, used again.
+#[derive(Debug, Clone, Default)]
+struct Casting {
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    scratch: Scratch,
 }
 
 impl DataPacket {
@@ -177,6 +186,7 @@ impl DataPacket {
             len: 0,
             received: Stamp::default(),
             truth: [ReturnTruth::default(); 384],
+            casting: Casting::default(),
         }
     }
 }
@@ -188,7 +198,7 @@ pub(crate) fn received_ns(sensor: SensorKind, index: u64) -> i64 {
 
 /// Makes the `index`-th data packet.
 pub(crate) fn make_packet(config: &SimulationConfig, index: u64, packet: &mut DataPacket) {
-    let sensor = config.sensor;
+    let (sensor, scene) = (config.sensor, &*config.scene);
     let begins_ns = index as i64 * sensor.packet_ns();
     let mut random = generator(config.seed, Purpose::Packets, index);
     let mut strays = Strays::new(config.seed, config.noise.stray_share, index);
@@ -198,30 +208,45 @@ pub(crate) fn make_packet(config: &SimulationConfig, index: u64, packet: &mut Da
         let time_s = (begins_ns + offset_ns) as f64 * 1e-9;
         config.trajectory.map_from_base(time_s) * config.base_from_lidar
     };
-    let mut echoes = Echoes::new();
-    let rises: [(f64, f64); 16] =
-        std::array::from_fn(|laser| sensor.firing(0, laser).elevation_rad.sin_cos());
+    let (head, casting) = (Head::new(sensor), &mut packet.casting);
+    casting.rays.clear();
     for group in 0..sensor.groups() {
         let from_ns = sensor.firing(group, 0).offset_ns;
-        let to_ns = sensor.firing(group, 15).offset_ns;
-        // Between the first and the last laser of a group (35 µs) the pose is interpolated: a
-        // body shaken at 60 rad/s² departs from that by 1e-8 rad.
-        let motion = GroupMotion::new(pose_at(from_ns), pose_at(to_ns));
-        for (laser, rise) in rises.into_iter().enumerate() {
-            let firing = sensor.firing(group, laser);
-            let share = (firing.offset_ns - from_ns) as f64 / (to_ns - from_ns) as f64;
-            let turned = (begins_ns + firing.offset_ns).rem_euclid(TURN_NS);
-            let head_rad = turned as f64 / TURN_NS as f64 * TAU;
-            let shot = Shot {
-                origin: lens(sensor, head_rad),
-                azimuth_rad: head_rad + firing.azimuth_offset_rad,
-                rise,
-            };
+        let to_ns = sensor.firing(group, LASERS - 1).offset_ns;
+        let turned = (begins_ns + from_ns).rem_euclid(TURN_NS) as f64 / TURN_NS as f64 * TAU;
+        head.aim(
+            &pose_at(from_ns),
+            &pose_at(to_ns),
+            turned,
+            &mut casting.rays,
+        );
+    }
+    let Casting {
+        rays,
+        hits,
+        scratch,
+    } = casting;
+    scene.cast_fans(rays, MAX_RANGE_M, scratch, hits);
+    let mut echoes = Echoes::new();
+    for group in 0..sensor.groups() {
+        for laser in 0..LASERS {
             echoes.clear();
-            shoot(&config.scene, sensor, &motion, share, shot, &mut echoes);
-            let noise = normal_pair(&mut random);
+            for ray in head.rays_of(laser) {
+                let ray = head.rays() * group + ray;
+                let (gain, wanted) = (head.gain, head.wanted);
+                trace(
+                    scene,
+                    rays[ray],
+                    hits[ray],
+                    gain,
+                    MAX_RANGE_M,
+                    wanted,
+                    &mut echoes,
+                );
+            }
+            let luck = uniform_pair(&mut random);
             let fading = random.random::<f32>();
-            let measured = Measurement::of(sensor.distance_unit_m(), &config.noise, noise, fading);
+            let measured = Measurement::of(sensor.distance_unit_m(), &config.noise, luck, fading);
             let (last, strongest) = sensor.channels(group, laser);
             match strongest {
                 None => {
@@ -292,74 +317,6 @@ pub(crate) fn make_status(
             helios::encode_difop(bytes, &utc);
             helios::BYTES
         }
-    }
-}
-
-/// Where the beams leave the sensor, in its frame.
-fn lens(sensor: SensorKind, head_rad: f64) -> [f64; 3] {
-    match sensor {
-        SensorKind::Vlp16 | SensorKind::Vlp16Dual => [0.0; 3],
-        SensorKind::Helios16P => {
-            let (sin, cos) = head_rad.sin_cos();
-            [helios::LENS_M * cos, -helios::LENS_M * sin, 0.0]
-        }
-    }
-}
-
-struct GroupMotion {
-    from: Pose,
-    to: Pose,
-}
-
-impl GroupMotion {
-    fn new(from: Pose, to: Pose) -> Self {
-        Self { from, to }
-    }
-
-    /// A place and a direction of the sensor's frame, in the map, `share` of the way.
-    fn in_map(&self, share: f64, at: [f64; 3], direction: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-        let (at, direction) = (
-            nalgebra::Point3::from(at),
-            hachi_hal::Vector3::from(direction),
-        );
-        let [a, b] = [&self.from, &self.to].map(|pose| (pose * at).coords);
-        let [c, d] = [&self.from, &self.to].map(|pose| pose.rotation * direction);
-        (
-            a.lerp(&b, share).into(),
-            c.lerp(&d, share).normalize().into(),
-        )
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Shot {
-    origin: [f64; 3],
-    azimuth_rad: f64,
-    /// Sine and cosine of the elevation.
-    rise: (f64, f64),
-}
-
-fn shoot(
-    scene: &Scene,
-    sensor: SensorKind,
-    motion: &GroupMotion,
-    share: f64,
-    shot: Shot,
-    echoes: &mut Echoes,
-) {
-    // A sensor that reports two echoes also sees both sides of an edge: half the beam each.
-    let (sides, gain, wanted): (&[f64], f32, _) = match sensor {
-        SensorKind::Vlp16Dual => (&[-HALF_BEAM_RAD, HALF_BEAM_RAD], 0.5, Wanted::Every),
-        SensorKind::Vlp16 | SensorKind::Helios16P => (&[0.0], 1.0, Wanted::Strongest),
-    };
-    let (up, level) = shot.rise;
-    for side in sides {
-        // Azimuth runs clockwise seen from above, from x.
-        let (sin, cos) = (shot.azimuth_rad + side).sin_cos();
-        let direction = [level * cos, -level * sin, up];
-        let (origin, direction) = motion.in_map(share, shot.origin, direction);
-        let ray = beam(origin, direction);
-        trace(scene, ray, gain, MAX_RANGE_M, wanted, echoes);
     }
 }
 

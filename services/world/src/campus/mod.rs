@@ -212,10 +212,11 @@ fn grid_scene(
 fn terrain(random: &mut ChaCha8Rng) -> Terrain {
     let waves = [(0.035, 150.0), (0.03, 115.0), (0.02, 85.0)].map(|(slope, length)| {
         let length_m = length * random.random_range(0.9..1.2);
+        let (sin, cos) = random.random_range(0.0..std::f64::consts::PI).sin_cos();
         Wave {
             amplitude_m: slope * length_m / std::f64::consts::TAU,
             length_m,
-            heading_rad: random.random_range(0.0..std::f64::consts::PI),
+            along: [cos, sin],
             phase_rad: random.random_range(0.0..std::f64::consts::TAU),
         }
     });
