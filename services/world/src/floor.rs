@@ -61,11 +61,26 @@ pub struct Wave {
 }
 
 impl Wave {
-    fn height(&self, x: f64, y: f64) -> f64 {
+    /// Height and slope along x and y.
+    fn rise(&self, x: f64, y: f64) -> Rising {
+        let number = std::f64::consts::TAU / self.length_m;
         let along = x * self.along[0] + y * self.along[1];
-        let turn = std::f64::consts::TAU / self.length_m * along + self.phase_rad;
-        self.amplitude_m * turn.sin()
+        let (sin, cos) = (number * along + self.phase_rad).sin_cos();
+        let slope = self.amplitude_m * number * cos;
+        Rising {
+            height: self.amplitude_m * sin,
+            slope: self.along.map(|share| slope * share),
+        }
     }
+}
+
+/// The ground at a place.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Rising {
+    /// Metres.
+    pub height: f64,
+    /// How it rises along x and y.
+    pub slope: [f64; 2],
 }
 
 /// Rolling ground: waves that add up, level about the origin.
@@ -82,8 +97,32 @@ pub struct Terrain {
 impl Terrain {
     /// The ground's height at a place, metres.
     pub fn height(&self, x: f64, y: f64) -> f64 {
-        let share = smooth::step((x.hypot(y) - self.level_m) / self.blend_m.max(1e-9));
-        share * self.waves.iter().map(|wave| wave.height(x, y)).sum::<f64>()
+        self.rise(x, y).height
+    }
+
+    /// Height and slope at a place.
+    pub(crate) fn rise(&self, x: f64, y: f64) -> Rising {
+        let mut sum = Rising::default();
+        for wave in &self.waves {
+            let rise = wave.rise(x, y);
+            sum.height += rise.height;
+            sum.slope = [0, 1].map(|axis| sum.slope[axis] + rise.slope[axis]);
+        }
+        let away = (x * x + y * y).sqrt();
+        let beyond = (away - self.level_m) / self.blend_m.max(1e-9);
+        if beyond >= 1.0 {
+            return sum;
+        }
+        // Where the ground sets in, the way out is a way up or down too.
+        let share = smooth::step(beyond);
+        let setting_in = smooth::step_slope(beyond) / self.blend_m.max(1e-9) / away.max(1e-9);
+        Rising {
+            height: share * sum.height,
+            slope: [
+                share * sum.slope[0] + setting_in * x * sum.height,
+                share * sum.slope[1] + setting_in * y * sum.height,
+            ],
+        }
     }
 }
 
@@ -99,11 +138,13 @@ pub struct Floor {
 impl Floor {
     /// The floor's height at a place, metres.
     pub fn height(&self, x: f64, y: f64) -> f64 {
-        let raised: f64 = self.raised.iter().map(|raised| raised.height(x, y)).sum();
-        match &self.terrain {
-            Some(terrain) => raised + terrain.height(x, y),
-            None => raised,
-        }
+        let terrain = self.terrain.as_ref();
+        self.raised_height(x, y) + terrain.map_or(0.0, |terrain| terrain.height(x, y))
+    }
+
+    /// How far what is raised lies over the terrain, metres.
+    pub(crate) fn raised_height(&self, x: f64, y: f64) -> f64 {
+        self.raised.iter().map(|raised| raised.height(x, y)).sum()
     }
 }
 
@@ -148,5 +189,14 @@ mod tests {
         assert!((terrain.height(150.0, 3.0) - 1.5).abs() < 1e-9);
         assert!(terrain.height(120.0, -70.0).abs() < 1e-9);
         assert!((terrain.height(90.0, 0.0) + 1.5).abs() < 1e-9);
+        // The slope is that of the heights around, where the ground sets in and beyond.
+        for (x, y) in [(3.0, 2.0), (15.0, -9.0), (-7.0, 22.0), (80.0, 5.0)] {
+            let slope = terrain.rise(x, y).slope;
+            let step = 1e-4;
+            let along_x = terrain.height(x + step, y) - terrain.height(x - step, y);
+            let along_y = terrain.height(x, y + step) - terrain.height(x, y - step);
+            assert!((slope[0] - along_x / (2.0 * step)).abs() < 1e-7, "{x} {y}");
+            assert!((slope[1] - along_y / (2.0 * step)).abs() < 1e-7, "{x} {y}");
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Rolling ground: heights on a square grid, two triangles to a cell.
 //!
 //! In: the terrain's height function, the rectangle to cover. Out: where a ray meets it first.
-//! The heights within a block of cells are bounded, so a ray steps over blocks that it passes
-//! above, and looks at single cells only where it may meet the ground. Between the grid's
+//! No ground is steeper than the steepest triangle, so a ray leaps as far as it can't have met
+//! the ground, and looks at single cells only where it comes near. Between the grid's
 //! points the surface departs from the height function by an eighth of the curvature along
 //! either axis: 2 mm on the ready-made terrains.
 
@@ -14,8 +14,12 @@ use crate::scene::{Hit, ObjectId};
 
 /// Edge of a cell, metres.
 const CELL_M: f32 = 1.0;
-/// Cells along the edge of a block.
-const BLOCK: usize = 16;
+/// Shorter leaps than this are not worth their while: single cells are looked at instead.
+const LEAST_LEAP_M: f32 = 1.5;
+/// So many of them, before the next leap is tried.
+const CELLS_A_TIME: usize = 4;
+/// A leap ends so far before it might meet the ground, against rounding, metres.
+const SAFETY_M: f32 = 1e-3;
 
 /// What the cells of a rectangle are covered with.
 #[derive(Debug, Clone, Copy)]
@@ -29,19 +33,19 @@ pub(crate) struct Cover {
 pub(crate) struct Ground {
     /// The place of the first grid point.
     low: [f32; 2],
-    /// Cells along x and y, whole blocks.
+    /// Cells along x and y.
     cells: [usize; 2],
     /// At the grid points, row by row: `cells[0] + 1` to a row.
     heights: Vec<f32>,
-    /// The greatest height of each block, row by row.
-    tops: Vec<f32>,
     /// The greatest height of all.
     top: f32,
+    /// The steepest slope of all.
+    steepest: f32,
     /// What each cell is covered with, row by row.
     objects: Vec<ObjectId>,
 }
 
-/// The stretch of a ray over one cell or block, and the way to the next.
+/// A walk along a ray from cell to cell.
 struct Walk {
     at: [isize; 2],
     step: [isize; 2],
@@ -51,8 +55,7 @@ struct Walk {
 }
 
 impl Walk {
-    /// From a point of the grid, both in units of `edge`.
-    fn new(from: [f32; 2], dir: [f32; 2], begin: f32, edge: f32, low: [f32; 2]) -> Self {
+    fn new(from: [f32; 2], dir: [f32; 2], begin: f32, low: [f32; 2]) -> Self {
         let mut walk = Self {
             at: [0; 2],
             step: [0; 2],
@@ -60,14 +63,14 @@ impl Walk {
             delta: [f32::INFINITY; 2],
         };
         for axis in 0..2 {
-            let place = (from[axis] + dir[axis] * begin - low[axis]) / edge;
+            let place = (from[axis] + dir[axis] * begin - low[axis]) / CELL_M;
             walk.at[axis] = place.floor() as isize;
             if dir[axis] != 0.0 {
                 walk.step[axis] = if dir[axis] > 0.0 { 1 } else { -1 };
                 let ahead = walk.at[axis] + isize::from(dir[axis] > 0.0);
-                let line = ahead as f32 * edge + low[axis];
+                let line = ahead as f32 * CELL_M + low[axis];
                 walk.next[axis] = ((line - from[axis]) / dir[axis]).max(begin);
-                walk.delta[axis] = (edge / dir[axis]).abs();
+                walk.delta[axis] = (CELL_M / dir[axis]).abs();
             }
         }
         walk
@@ -84,14 +87,16 @@ impl Walk {
     }
 }
 
+/// How far a ray moves on the level for each metre.
+fn level(ray: &Ray) -> f32 {
+    (ray.dir.x * ray.dir.x + ray.dir.y * ray.dir.y).sqrt()
+}
+
 impl Ground {
     /// The terrain over a rectangle. The first cover is everywhere where no later one is.
     pub fn new(terrain: &Terrain, low: [f64; 2], high: [f64; 2], covers: &[Cover]) -> Self {
         let edge = f64::from(CELL_M);
-        let cells = [0, 1].map(|axis| {
-            let cells = ((high[axis] - low[axis]) / edge).ceil().max(1.0) as usize;
-            cells.div_ceil(BLOCK) * BLOCK
-        });
+        let cells = [0, 1].map(|axis| ((high[axis] - low[axis]) / edge).ceil().max(1.0) as usize);
         let place = |i: usize, axis: usize| low[axis] + edge * i as f64;
         let mut heights = Vec::with_capacity((cells[0] + 1) * (cells[1] + 1));
         for j in 0..=cells[1] {
@@ -110,34 +115,93 @@ impl Ground {
                 objects.push(cover.map_or(0, |cover| cover.object));
             }
         }
-        let mut tops = Vec::with_capacity(cells[0] * cells[1] / (BLOCK * BLOCK));
-        for block_j in 0..cells[1] / BLOCK {
-            for block_i in 0..cells[0] / BLOCK {
-                let mut top = f32::MIN;
-                for j in block_j * BLOCK..=(block_j + 1) * BLOCK {
-                    for i in block_i * BLOCK..=(block_i + 1) * BLOCK {
-                        top = top.max(heights[j * (cells[0] + 1) + i]);
-                    }
-                }
-                tops.push(top);
-            }
-        }
+        let row = cells[0] + 1;
+        let slope = |a: usize, b: usize| (heights[a] - heights[b]) / CELL_M;
+        let steepest = (0..cells[1])
+            .flat_map(|j| (0..cells[0]).map(move |i| j * row + i))
+            .map(|at| {
+                let below = slope(at + 1, at).hypot(slope(at + row + 1, at + 1));
+                let above = slope(at + row + 1, at + row).hypot(slope(at + row, at));
+                below.max(above)
+            })
+            .fold(0.0, f32::max);
         Self {
             low: low.map(|x| x as f32),
             cells,
+            top: heights.iter().copied().fold(f32::MIN, f32::max),
             heights,
-            top: tops.iter().copied().fold(f32::MIN, f32::max),
-            tops,
+            steepest,
             objects,
         }
     }
 
     /// Where a ray from above the ground meets it first.
     pub fn cast(&self, ray: &Ray, within: f32) -> Option<Hit> {
+        self.cast_from(ray, 0.0, within)
+    }
+
+    /// As [`cast`](Self::cast) for each ray of a fan.
+    pub fn cast_fan(&self, rays: &[Ray], within: f32, hits: &mut [Option<Hit>]) {
+        let free = self.free(rays, within);
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.cast_from(ray, free / level(ray), within);
+        }
+    }
+
+    /// How far on the level none of the rays can have met the ground: they lie over one ray that
+    /// starts from the lowest of their places and rises like the least of them, or beside it by
+    /// no more than they spread.
+    fn free(&self, rays: &[Ray], within: f32) -> f32 {
+        let Some((first, others)) = rays.split_first() else {
+            return 0.0;
+        };
+        let mut lowest = Ray::new(first.origin, first.dir / level(first));
+        let (mut spread, mut apart) = (0.0f32, 0.0f32);
+        for ray in others {
+            let dir = ray.dir / level(ray);
+            spread = spread.max((dir - lowest.dir).truncate().length());
+            apart = apart.max((ray.origin - lowest.origin).truncate().length());
+            lowest.origin.z = lowest.origin.z.min(ray.origin.z);
+            lowest.dir.z = lowest.dir.z.min(dir.z);
+        }
+        // The ground comes nearer by its slope, ahead and to the sides.
+        let closing = self.steepest * (1.0 + spread) - lowest.dir.z;
+        if closing.is_nan() || !self.covers(&lowest, 0.0) {
+            return 0.0;
+        }
+        let mut at = 0.0;
+        loop {
+            let beside = self.steepest * (apart + spread * at);
+            let clearance = self.clearance(&lowest, at) - beside - SAFETY_M;
+            if clearance > 0.0 && closing <= 0.0 {
+                return within;
+            }
+            let leap = clearance / closing;
+            if leap >= within - at {
+                return within;
+            }
+            // Beyond the rectangle nothing is known of the ground.
+            if leap < LEAST_LEAP_M || !self.covers(&lowest, at + leap) {
+                return at;
+            }
+            at += leap;
+        }
+    }
+
+    /// Whether a place of a ray is over the rectangle.
+    fn covers(&self, ray: &Ray, at: f32) -> bool {
+        let point = ray.point_at(at);
+        [point.x, point.y].into_iter().enumerate().all(|(a, x)| {
+            let within = x - self.low[a];
+            within >= 0.0 && within < self.cells[a] as f32 * CELL_M
+        })
+    }
+
+    fn cast_from(&self, ray: &Ray, free: f32, within: f32) -> Option<Hit> {
         let from = [ray.origin.x, ray.origin.y];
         let dir = [ray.dir.x, ray.dir.y];
         // Only where the ray is over the rectangle and not higher than all of the ground.
-        let (mut begin, mut end) = (0.0f32, within);
+        let (mut begin, mut end) = (free, within);
         for axis in 0..2 {
             let high = self.low[axis] + self.cells[axis] as f32 * CELL_M;
             if dir[axis] == 0.0 {
@@ -162,69 +226,70 @@ impl Ground {
         if begin.is_nan() || begin >= end {
             return None;
         }
-        let edge = BLOCK as f32 * CELL_M;
-        let blocks = self.cells.map(|cells| (cells / BLOCK) as isize);
-        let mut walk = Walk::new(from, dir, begin, edge, self.low);
-        let mut enters = begin;
-        while enters < end {
-            let leaves = walk.leaves().min(end);
-            if (0..2).all(|axis| (0..blocks[axis]).contains(&walk.at[axis])) {
-                let top = self.tops[(walk.at[1] * blocks[0] + walk.at[0]) as usize];
-                let lowest =
-                    ray.origin.z + ray.dir.z * if ray.dir.z < 0.0 { leaves } else { enters };
-                if lowest <= top
-                    && let Some(hit) = self.within_block(ray, enters, leaves, walk.at)
-                {
-                    return Some(hit);
+        // How fast the ground can come nearer at most.
+        let closing = self.steepest * level(ray) - ray.dir.z;
+        if closing <= 0.0 {
+            return None;
+        }
+        let mut at = begin;
+        loop {
+            loop {
+                let leap = (self.clearance(ray, at) - SAFETY_M) / closing;
+                if leap < LEAST_LEAP_M {
+                    break;
+                }
+                at += leap;
+                if at >= end {
+                    return None;
                 }
             }
-            enters = leaves;
-            walk.advance();
+            let mut walk = Walk::new(from, dir, at, self.low);
+            for _ in 0..CELLS_A_TIME {
+                let leaves = walk.leaves().min(end);
+                if let Some(hit) = self.within_cell(ray, at, leaves, walk.at) {
+                    return Some(hit);
+                }
+                at = leaves;
+                if at >= end {
+                    return None;
+                }
+                walk.advance();
+            }
         }
-        None
     }
 
-    fn within_block(&self, ray: &Ray, begin: f32, end: f32, block: [isize; 2]) -> Option<Hit> {
-        let from = [ray.origin.x, ray.origin.y];
-        let dir = [ray.dir.x, ray.dir.y];
-        let mut walk = Walk::new(from, dir, begin, CELL_M, self.low);
-        // Rounding may put the first cell beside the block: it belongs to the block's edge.
-        let first = block.map(|b| b * BLOCK as isize);
-        for (axis, least) in first.into_iter().enumerate() {
-            let clamped = walk.at[axis].clamp(least, least + BLOCK as isize - 1);
-            if clamped != walk.at[axis] && walk.step[axis] == clamped - walk.at[axis] {
-                walk.next[axis] += walk.delta[axis];
-            }
-            walk.at[axis] = clamped;
-        }
-        let mut enters = begin;
-        loop {
-            let leaves = walk.leaves().min(end);
-            if let Some(hit) = self.within_cell(ray, enters, leaves, walk.at) {
-                return Some(hit);
-            }
-            if leaves >= end {
-                return None;
-            }
-            enters = leaves;
-            walk.advance();
-            if (0..2).any(|a| walk.at[a] < first[a] || walk.at[a] >= first[a] + BLOCK as isize) {
-                return None;
-            }
-        }
+    /// How far over the ground a ray is; over what lies beyond the rectangle, none.
+    fn clearance(&self, ray: &Ray, at: f32) -> f32 {
+        let point = ray.point_at(at);
+        let place = [point.x - self.low[0], point.y - self.low[1]].map(|x| x / CELL_M);
+        let cell = [0, 1].map(|a| (place[a] as usize).min(self.cells[a] - 1));
+        let Some([h00, h10, h01, h11]) = self.corners(cell) else {
+            return 0.0;
+        };
+        let [u, v] = [0, 1].map(|a| place[a] - cell[a] as f32);
+        let ground = if u >= v {
+            h00 + (h10 - h00) * u + (h11 - h10) * v
+        } else {
+            h00 + (h11 - h01) * u + (h01 - h00) * v
+        };
+        point.z - ground
+    }
+
+    /// The heights at a cell's corners.
+    fn corners(&self, [i, j]: [usize; 2]) -> Option<[f32; 4]> {
+        let row = self.cells[0] + 1;
+        let corner = j * row + i;
+        let near = self.heights.get(corner..corner + 2)?;
+        let far = self.heights.get(corner + row..corner + row + 2)?;
+        Some([near[0], near[1], far[0], far[1]])
     }
 
     /// A cell is cut along its diagonal; over each half the ray's clearance is a linear function
     /// of the way, so where it changes sign the ray meets the ground: no gap between triangles.
     fn within_cell(&self, ray: &Ray, enters: f32, leaves: f32, at: [isize; 2]) -> Option<Hit> {
-        let [i, j] = at.map(|a| a as usize);
-        let row = self.cells[0] + 1;
-        let corner = j * row + i;
-        let (near, far) = (
-            self.heights.get(corner..corner + 2)?,
-            self.heights.get(corner + row..corner + row + 2)?,
-        );
-        let [h00, h10, h01, h11] = [near[0], near[1], far[0], far[1]];
+        // Rounding may put an end of the ray beside the rectangle.
+        let [i, j] = [0, 1].map(|a| at[a].clamp(0, self.cells[a] as isize - 1) as usize);
+        let [h00, h10, h01, h11] = self.corners([i, j])?;
         let high = h00.max(h10).max(h01).max(h11);
         let z = |t: f32| ray.origin.z + ray.dir.z * t;
         if z(enters).min(z(leaves)) > high {
@@ -250,19 +315,19 @@ impl Ground {
             } else {
                 [h11 - h01, h01 - h00]
             };
-            let clearance =
-                |t: f32| z(t) - (h00 + slope[0] * (x + dx * t) + slope[1] * (y + dy * t));
-            let (before, after) = (clearance(begin), clearance(end));
-            if after <= 0.0 && begin < end {
+            // The clearance at the start of the ray, and how it changes.
+            let start = ray.origin.z - (h00 + slope[0] * x + slope[1] * y);
+            let change = ray.dir.z - (slope[0] * dx + slope[1] * dy);
+            if start + change * end <= 0.0 && begin < end {
                 // Below from the first: rounding at an edge that belongs to both.
-                let share = if before <= 0.0 {
-                    0.0
+                let distance = if change < 0.0 {
+                    (-start / change).clamp(begin, end)
                 } else {
-                    before / (before - after)
+                    begin
                 };
                 let [sx, sy] = slope.map(|s| s / CELL_M);
                 return Some(Hit {
-                    distance: begin + share * (end - begin),
+                    distance,
                     normal: Vector::new(-sx, -sy, 1.0) / (1.0 + sx * sx + sy * sy).sqrt(),
                     object: self.objects[j * self.cells[0] + i],
                 });

@@ -13,7 +13,7 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Cuboid, Triangle};
 
-use crate::fan::{self, Scratch};
+use crate::fan::{self, RAYS, Scratch};
 use crate::floor::Floor;
 use crate::ground::Ground;
 use crate::material::Material;
@@ -283,10 +283,12 @@ impl Scene {
         hits: &mut Vec<Option<Hit>>,
     ) {
         hits.clear();
-        hits.extend(
-            rays.iter()
-                .map(|ray| self.ground.as_ref()?.cast(ray, within)),
-        );
+        hits.resize(rays.len(), None);
+        if let Some(ground) = &self.ground {
+            for (rays, hits) in rays.chunks(RAYS).zip(hits.chunks_mut(RAYS)) {
+                ground.cast_fan(rays, within, hits);
+            }
+        }
         let nearest = &mut scratch.nearest;
         nearest.distances.clear();
         let reaches = hits
@@ -491,6 +493,43 @@ mod tests {
                 got == expected || (got - expected).abs() < 1e-3,
                 "ray {k}: {got} and {expected}"
             );
+        }
+    }
+    #[test]
+    fn rays_cast_together_hit_what_they_hit_alone() {
+        use crate::Preset;
+        for preset in Preset::ALL {
+            let world = preset.world(5);
+            let (mut scratch, mut hits) = (Scratch::default(), Vec::new());
+            let mut same = 0;
+            for place in 0..60 {
+                let time_s = world.trajectory.period_s() * f64::from(place) / 60.0;
+                let eye = world.trajectory.map_from_base(time_s).translation.vector;
+                let heading = f64::from(place) * 0.9;
+                let rays: Vec<Ray> = (0..10)
+                    .flat_map(|fan| (0..8).map(move |ray| (fan, ray)))
+                    .map(|(fan, ray)| {
+                        let azimuth = heading + 0.02 * f64::from(fan) + 0.0003 * f64::from(ray);
+                        let up = 0.035 * f64::from(ray + 8 * (fan % 2)) - 0.26;
+                        let dir = Vector3::new(azimuth.cos(), azimuth.sin(), up).normalize();
+                        Ray::new(narrow(eye + Vector3::z() * 0.2), narrow(dir))
+                    })
+                    .collect();
+                world.scene.cast_fans(&rays, 100.0, &mut scratch, &mut hits);
+                for (ray, together) in rays.iter().zip(&hits) {
+                    let alone = world.scene.cast(ray, 100.0, None);
+                    match (alone, together) {
+                        (None, None) => {}
+                        (Some(alone), Some(together)) => {
+                            let off = (alone.distance - together.distance).abs();
+                            assert!(off <= 1e-4 * alone.distance, "{preset:?}: {off}");
+                            same += usize::from(alone.object == together.object);
+                        }
+                        _ => panic!("{preset:?}: {ray:?} hits {alone:?}, {together:?}"),
+                    }
+                }
+            }
+            assert!(same > 1500, "{preset:?}: {same}");
         }
     }
 }

@@ -9,6 +9,12 @@ pub(crate) fn step(t: f64) -> f64 {
     t * t * t * (10.0 + t * (6.0 * t - 15.0))
 }
 
+/// The derivative of [`step`].
+pub(crate) fn step_slope(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    30.0 * t * t * (1.0 - t) * (1.0 - t)
+}
+
 /// The integral of [`step`] from 0 to `t`: 0.5 at 1, then rising with slope 1.
 pub(crate) fn step_integral(t: f64) -> f64 {
     if t <= 0.0 {

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 use hachi_hal::{Pose, Rotation, Vector3};
 use nalgebra::{Matrix3, Rotation3, Translation3};
 
-use crate::floor::Floor;
+use crate::floor::{Floor, Rising};
 use crate::motion::BodyMotion;
 use crate::path::Path;
 use crate::smooth::Rise;
@@ -279,13 +279,18 @@ impl Trajectory {
         let [along, across] = HALF_STANCE_M;
         let foot = |f: f64, l: f64| {
             self.floor
-                .height(x + f * cos - l * sin, y + f * sin + l * cos)
+                .raised_height(x + f * cos - l * sin, y + f * sin + l * cos)
         };
         let [front_left, front_right] = [foot(along, across), foot(along, -across)];
         let [hind_left, hind_right] = [foot(-along, across), foot(-along, -across)];
-        let slope_along = (front_left + front_right - hind_left - hind_right) / (4.0 * along);
-        let slope_across = (front_left + hind_left - front_right - hind_right) / (4.0 * across);
-        let height = (front_left + front_right + hind_left + hind_right) / 4.0;
+        // The terrain curves by a fraction of a millimetre under the feet: its plane is their plane.
+        let terrain = self.floor.terrain.as_ref();
+        let rise = terrain.map_or_else(Rising::default, |terrain| terrain.rise(x, y));
+        let slope_along = (front_left + front_right - hind_left - hind_right) / (4.0 * along)
+            + (rise.slope[0] * cos + rise.slope[1] * sin);
+        let slope_across = (front_left + hind_left - front_right - hind_right) / (4.0 * across)
+            + (rise.slope[1] * cos - rise.slope[0] * sin);
+        let height = (front_left + front_right + hind_left + hind_right) / 4.0 + rise.height;
         // The plane's normal and its x axis, in a frame that only follows the heading.
         let forward = Vector3::new(1.0, 0.0, slope_along).normalize();
         let up = Vector3::new(-slope_along, -slope_across, 1.0).normalize();
