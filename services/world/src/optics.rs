@@ -287,7 +287,7 @@ fn scatter(scene: &Scene, branch: &Branch, hit: &Hit) -> Scattered {
         let angle = cosine.acos() / GLINT_WIDTH;
         material.reflectivity * (-angle * angle).exp() + DUST
     } else {
-        material.reflectivity * cosine.powf(material.incidence_exponent) * (1.0 - mirrored)
+        material.reflectivity * darkening(material, cosine) * (1.0 - mirrored)
     };
     let (power, intensity) = match material.finish {
         // The manual puts an ideal retro-reflector at 255 and the least of them above 100.
@@ -307,6 +307,15 @@ fn scatter(scene: &Scene, branch: &Branch, hit: &Hit) -> Scattered {
         },
         mirrored,
         passed,
+    }
+}
+
+/// The cosine to the material's power, the two usual ones in a hurry.
+fn darkening(material: &Material, cosine: f32) -> f32 {
+    match material.incidence_exponent {
+        1.0 => cosine,
+        0.5 => cosine.sqrt(),
+        exponent => cosine.powf(exponent),
     }
 }
 

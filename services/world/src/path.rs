@@ -108,7 +108,12 @@ fn mix(a: Point, b: Point, u: f64) -> Point {
 
 #[derive(Debug, Clone)]
 enum Piece {
-    Line { from: Point, heading: f64 },
+    Line {
+        from: Point,
+        heading: f64,
+        /// Its cosine and sine.
+        along: Point,
+    },
     Corner(Box<Corner>),
 }
 
@@ -171,8 +176,13 @@ impl Path {
 
     fn line(&mut self, from: Point, to: Point, direction: Point) {
         let heading = direction[1].atan2(direction[0]);
-        self.pieces
-            .push((self.length, Piece::Line { from, heading }));
+        let (sin, cos) = heading.sin_cos();
+        let piece = Piece::Line {
+            from,
+            heading,
+            along: [cos, sin],
+        };
+        self.pieces.push((self.length, piece));
         self.length += (to[0] - from[0]).hypot(to[1] - from[1]);
     }
 
@@ -192,9 +202,13 @@ impl Path {
         let (begins, piece) = &self.pieces[piece];
         let within = length - begins;
         match piece {
-            Piece::Line { from, heading } => {
-                let (sin, cos) = heading.sin_cos();
-                ([from[0] + cos * within, from[1] + sin * within], *heading)
+            Piece::Line {
+                from,
+                heading,
+                along,
+            } => {
+                let place = [0, 1].map(|axis| from[axis] + along[axis] * within);
+                (place, *heading)
             }
             Piece::Corner(corner) => corner.at_length(within),
         }

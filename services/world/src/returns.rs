@@ -107,10 +107,11 @@ impl<'a> Measurement<'a> {
         let range_error_m = self.noise.range_sigma_m * range;
         let intensity_factor = 1.0 + self.noise.intensity_sigma * intensity;
         let counts = (f64::from(echo.distance) + range_error_m) / self.unit_m;
-        let intensity = (f64::from(echo.intensity) * intensity_factor).round();
+        let intensity = f64::from(echo.intensity) * intensity_factor;
         let report = Report {
-            distance: counts.round().clamp(1.0, 65_535.0) as u16,
-            intensity: intensity.clamp(0.0, 255.0) as u8,
+            // Both are rounded to the nearest.
+            distance: (counts + 0.5).clamp(1.0, 65_535.0) as u16,
+            intensity: (intensity + 0.5).clamp(0.0, 255.0) as u8,
         };
         let truth = ReturnTruth {
             label: echo.label,

@@ -13,7 +13,7 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Cuboid, Triangle};
 
-use crate::fan::{self, RAYS, Scratch};
+use crate::fan::{self, Scratch};
 use crate::floor::Floor;
 use crate::ground::Ground;
 use crate::material::Material;
@@ -105,7 +105,11 @@ impl Shape {
             Self::Box {
                 world_from_box,
                 cuboid,
-            } => cuboid.cast_ray_and_get_normal(world_from_box, ray, within, true),
+            } => {
+                let half = cuboid.half_extents;
+                let ray = ray.inverse_transform_by(world_from_box);
+                return world_from_box.rotation * box_normal(&Aabb::new(-half, half), &ray);
+            }
             Self::Cylinder {
                 base,
                 radius,
@@ -273,11 +277,13 @@ impl Scene {
         }
     }
 
-    /// As [`cast`](Self::cast) for each of the rays, passing by nothing: they come in fans, see
-    /// `fan`. Their hits are put in the place of what is in `hits`.
+    /// As [`cast`](Self::cast) for each of the rays, passing by nothing. They come in fans, see
+    /// `fan`, and every `stride`-th ray is about the same, but for some thousandths of a turn.
+    /// Their hits are put in the place of what is in `hits`.
     pub(crate) fn cast_fans(
         &self,
         rays: &[Ray],
+        stride: usize,
         within: f32,
         scratch: &mut Scratch,
         hits: &mut Vec<Option<Hit>>,
@@ -285,9 +291,7 @@ impl Scene {
         hits.clear();
         hits.resize(rays.len(), None);
         if let Some(ground) = &self.ground {
-            for (rays, hits) in rays.chunks(RAYS).zip(hits.chunks_mut(RAYS)) {
-                ground.cast_fan(rays, within, hits);
-            }
+            ground.cast_alike(rays, stride, within, hits);
         }
         let nearest = &mut scratch.nearest;
         nearest.distances.clear();
@@ -515,7 +519,9 @@ mod tests {
                         Ray::new(narrow(eye + Vector3::z() * 0.2), narrow(dir))
                     })
                     .collect();
-                world.scene.cast_fans(&rays, 100.0, &mut scratch, &mut hits);
+                world
+                    .scene
+                    .cast_fans(&rays, 16, 100.0, &mut scratch, &mut hits);
                 for (ray, together) in rays.iter().zip(&hits) {
                     let alone = world.scene.cast(ray, 100.0, None);
                     match (alone, together) {

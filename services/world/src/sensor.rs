@@ -226,7 +226,7 @@ pub(crate) fn make_packet(config: &SimulationConfig, index: u64, packet: &mut Da
         hits,
         scratch,
     } = casting;
-    scene.cast_fans(rays, MAX_RANGE_M, scratch, hits);
+    scene.cast_fans(rays, head.rays(), MAX_RANGE_M, scratch, hits);
     let mut echoes = Echoes::new();
     for group in 0..sensor.groups() {
         for laser in 0..LASERS {

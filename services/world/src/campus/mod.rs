@@ -36,7 +36,7 @@ const START_M: f64 = 20.0;
 /// How far ground reaches beyond the last street, metres.
 const BEYOND_M: f64 = 40.0;
 const ASPHALT: Material = Material {
-    incidence_exponent: 0.6,
+    incidence_exponent: 0.5,
     ..Material::rough(0.17)
 };
 const GRASS: Material = Material {
