@@ -181,8 +181,9 @@ impl SafetyGate {
         causes.add_if(Cause::CameraStale, config.camera_needed && !image);
         let near = sight.person.is_some_and(|(seen, [x, y])| {
             let believed = fresh(now, Some(seen), config.person_expires_s);
+            let distance = x.hypot(y);
             // Not-a-number is near: whoever says so knows nothing.
-            believed && !(x.hypot(y) > config.safety_circle_m())
+            believed && (distance.is_nan() || distance <= config.safety_circle_m())
         });
         causes.add_if(Cause::PersonNear, near);
     }
