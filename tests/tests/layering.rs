@@ -149,6 +149,18 @@ const LAYERS: &[Layer] = &[
         tests_see: &[],
         because: "a simulation that used the decoders it tests would share their mistakes",
     },
+    Layer {
+        name: "hachi-behaviour",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "the gate holds for every robot and every behaviour: it knows neither",
+    },
+    Layer {
+        name: "hachi-runtime",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "who runs tasks does not know what they compute",
+    },
 ];
 
 /// The only ones that see both ends: the program, and the tests of the whole.
