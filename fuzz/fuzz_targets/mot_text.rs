@@ -14,7 +14,10 @@ fuzz_target!(|bytes: &[u8]| {
     let Ok(boxes) = read(bytes) else { return };
     let mut text = Vec::new();
     write(&boxes, &mut text).expect("a Vec takes everything");
-    assert_eq!(read(&text[..]).map(|again| again.len()).ok(), Some(boxes.len()));
+    assert_eq!(
+        read(&text[..]).map(|again| again.len()).ok(),
+        Some(boxes.len())
+    );
     if boxes.len() > MANY {
         return;
     }
@@ -23,6 +26,9 @@ fuzz_target!(|bytes: &[u8]| {
         assert!(line.bounding_box.is_sound(), "{line:?}");
     }
     if let Ok(metrics) = evaluate(&boxes, &tracks) {
-        assert!(metrics.mota <= 1.0 && (0.0..=1.0).contains(&metrics.idf1), "{metrics:?}");
+        assert!(
+            metrics.mota <= 1.0 && (0.0..=1.0).contains(&metrics.idf1),
+            "{metrics:?}"
+        );
     }
 });

@@ -51,6 +51,13 @@ const LAYERS: &[Layer] = &[
                   from any source, so only its tests name one",
     },
     Layer {
+        name: "hachi-realsense",
+        sees: &["hachi-hal", "hachi-turns"],
+        tests_see: &[],
+        because: "a driver knows its device: no other maker, no robot, no service; a camera's clock \
+                  is moved onto the robot's as a LiDAR's is",
+    },
+    Layer {
         name: "hachi-unitree",
         sees: &["hachi-hal", "hachi-datagram"],
         tests_see: &["hachi-b1", "hachi-go1"],
