@@ -8,11 +8,17 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         assert_eq!(descriptor.to_bytes(), bytes);
         let mut database = Database::default();
         let mut matches = Vec::new();
-        database.insert(7, &descriptor).expect("the first decides the layout");
+        database
+            .insert(7, &descriptor)
+            .expect("the first decides the layout");
         database
             .query(std::slice::from_ref(&descriptor), |_| true, 3, &mut matches)
             .expect("one layout");
-        assert!(matches.iter().all(|m| m.similarity.is_finite() && m.yaw_rad.is_finite()));
+        assert!(
+            matches
+                .iter()
+                .all(|m| m.similarity.is_finite() && m.yaw_rad.is_finite())
+        );
     }
     let Ok(mut database) = Database::from_bytes(bytes) else {
         return;

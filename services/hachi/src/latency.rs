@@ -1,36 +1,11 @@
-//! How long steps take: a recorder of fixed size that never allocates while recording.
-//!
-//! Times go into buckets whose width grows with the time, as in an HDR histogram: 128 buckets for
-//! each doubling, so that a percentile is off by at most 0.4 %. Mean and maximum are exact. The
-//! same times give the same answer in any order, whatever their number.
+//! Times of many steps, as reports have them.
 
-use std::time::Duration;
-
+use hachi_runtime::Summary;
 use serde::Serialize;
-
-/// Buckets for each doubling, as a power of two.
-const SPLIT_BITS: u32 = 7;
-/// Times from here on share the last bucket: 2^41 ns, 37 minutes.
-const TOP_BIT: u32 = 41;
-const SPLIT: usize = 1 << SPLIT_BITS;
-/// One bucket a nanosecond below 2^7, then `SPLIT` for each doubling up to 2^41.
-const BUCKETS: usize = SPLIT * (TOP_BIT - SPLIT_BITS + 1) as usize;
-
-/// Counts of times. 35 kB.
-#[derive(Debug, Clone)]
-pub struct LatencyRecorder {
-    counts: Box<[u64]>,
-    runs: u64,
-    sum_ns: u128,
-    max_ns: u64,
-}
 
 /// A summary of many times, milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct LatencySummary {
-    /// How many.
-    #[serde(skip)]
-    pub runs: u64,
     /// Mean.
     #[serde(rename = "mean")]
     pub mean_ms: f64,
@@ -45,124 +20,13 @@ pub struct LatencySummary {
     pub max_ms: f64,
 }
 
-impl Default for LatencyRecorder {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl LatencyRecorder {
-    /// A recorder without times. Allocates; recording does not.
-    pub fn new() -> Self {
+impl From<Summary> for LatencySummary {
+    fn from(times: Summary) -> Self {
         Self {
-            counts: vec![0; BUCKETS].into_boxed_slice(),
-            runs: 0,
-            sum_ns: 0,
-            max_ns: 0,
+            mean_ms: times.mean_ms,
+            p50_ms: times.p50_ms,
+            p99_ms: times.p99_ms,
+            max_ms: times.max_ms,
         }
-    }
-
-    /// Adds a time.
-    pub fn record(&mut self, time: Duration) {
-        let nanos = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
-        self.counts[bucket(nanos)] += 1; // `bucket` is below BUCKETS for every time
-        self.runs += 1;
-        self.sum_ns += u128::from(nanos);
-        self.max_ns = self.max_ns.max(nanos);
-    }
-
-    /// How many times were added.
-    pub fn runs(&self) -> u64 {
-        self.runs
-    }
-
-    /// The time that `share` (0 to 1) of all times do not exceed, nanoseconds.
-    fn percentile_ns(&self, share: f64) -> f64 {
-        let wanted = ((share * self.runs as f64).ceil() as u64).max(1);
-        let mut seen = 0;
-        for (index, count) in self.counts.iter().enumerate() {
-            seen += count;
-            if seen >= wanted {
-                return middle_ns(index).min(self.max_ns as f64);
-            }
-        }
-        self.max_ns as f64
-    }
-
-    /// What they come down to; zeros if there are none.
-    pub fn summary(&self) -> LatencySummary {
-        if self.runs == 0 {
-            return LatencySummary::default();
-        }
-        let milliseconds = |nanos: f64| nanos * 1e-6;
-        LatencySummary {
-            runs: self.runs,
-            mean_ms: milliseconds(self.sum_ns as f64 / self.runs as f64),
-            p50_ms: milliseconds(self.percentile_ns(0.5)),
-            p99_ms: milliseconds(self.percentile_ns(0.99)),
-            max_ms: milliseconds(self.max_ns as f64),
-        }
-    }
-}
-
-/// The bucket of a time.
-fn bucket(nanos: u64) -> usize {
-    let nanos = nanos.min((1 << TOP_BIT) - 1);
-    let doublings = (u64::BITS - nanos.leading_zeros()).saturating_sub(SPLIT_BITS + 1);
-    doublings as usize * SPLIT + (nanos >> doublings) as usize
-}
-
-/// The middle of a bucket, nanoseconds.
-fn middle_ns(index: usize) -> f64 {
-    // Above the first doubling the top bit of a time is always set, so each has SPLIT buckets
-    // that begin at SPLIT: indices 2 * SPLIT and on belong to the second doubling.
-    let doublings = (index / SPLIT).saturating_sub(1);
-    let low = ((index - doublings * SPLIT) as u64) << doublings;
-    low as f64 + ((1u64 << doublings) - 1) as f64 / 2.0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_time_has_a_bucket_whose_middle_is_near() {
-        let mut nanos = 1u64;
-        while nanos < 1 << 40 {
-            for time in [nanos - 1, nanos, nanos + nanos / 3] {
-                let middle = middle_ns(bucket(time));
-                assert!(
-                    (middle - time as f64).abs() <= 0.004 * time as f64,
-                    "{time} {middle}"
-                );
-            }
-            nanos *= 2;
-        }
-        assert!(bucket(u64::MAX) < BUCKETS);
-    }
-
-    #[test]
-    fn percentiles_of_one_to_a_thousand_milliseconds() {
-        let mut recorder = LatencyRecorder::new();
-        for millis in (1..=1000).rev() {
-            recorder.record(Duration::from_millis(millis));
-        }
-        let summary = recorder.summary();
-        assert_eq!(summary.runs, 1000);
-        assert!((summary.mean_ms - 500.5).abs() < 1e-9);
-        assert!((summary.p50_ms - 500.0).abs() < 2.0, "{summary:?}");
-        assert!((summary.p99_ms - 990.0).abs() < 4.0, "{summary:?}");
-        assert_eq!(summary.max_ms, 1000.0);
-    }
-
-    #[test]
-    fn one_time_is_its_own_summary_and_none_is_zeros() {
-        let mut recorder = LatencyRecorder::new();
-        assert_eq!(recorder.summary(), LatencySummary::default());
-        recorder.record(Duration::from_nanos(12_345_678));
-        let summary = recorder.summary();
-        assert!((summary.p50_ms - 12.345_678).abs() < 0.05);
-        assert_eq!(summary.max_ms, 12.345_678);
-        assert!(summary.p99_ms <= summary.max_ms);
     }
 }

@@ -5,10 +5,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use hachi_odometry::Condition;
+use hachi_runtime::{Histogram, Summary};
 use serde::Serialize;
 
 use crate::exit::Failure;
-use crate::latency::{LatencyRecorder, LatencySummary};
+use crate::latency::LatencySummary;
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -115,8 +116,8 @@ impl From<hachi_slam::LoopCounts> for LoopCounts {
     }
 }
 
-impl From<LatencySummary> for StageTimes {
-    fn from(times: LatencySummary) -> Self {
+impl From<Summary> for StageTimes {
+    fn from(times: Summary) -> Self {
         Self {
             runs: times.runs,
             mean_ms: times.mean_ms,
@@ -158,19 +159,19 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), Failure> {
 /// Times of the stages of a pipeline and of whole scans.
 ///
 /// Stages are named once, at the start; recording then allocates nothing.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct StageRecorder {
-    stages: Vec<(&'static str, LatencyRecorder)>,
-    per_scan: LatencyRecorder,
+    stages: Vec<(&'static str, Histogram)>,
+    per_scan: Histogram,
 }
 
 impl StageRecorder {
     /// A recorder for stages of these names; a stage is recorded by its index here.
     pub fn new(names: &[&'static str]) -> Self {
-        let stage = |name: &&'static str| (*name, LatencyRecorder::new());
+        let stage = |name: &&'static str| (*name, Histogram::new());
         Self {
             stages: names.iter().map(stage).collect(),
-            per_scan: LatencyRecorder::new(),
+            per_scan: Histogram::new(),
         }
     }
 
@@ -192,7 +193,7 @@ impl StageRecorder {
             let times = recorder.summary().into();
             report.stages.insert((*name).to_owned(), times);
         }
-        report.total_per_scan_ms = self.per_scan.summary();
+        report.total_per_scan_ms = self.per_scan.summary().into();
     }
 }
 

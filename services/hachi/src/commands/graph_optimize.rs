@@ -11,12 +11,12 @@ use hachi_posegraph::g2o::{self, Contents, Document, ReadError, Repairs, Writabl
 use hachi_posegraph::initialise::{self, Rigid, Start};
 use hachi_posegraph::replay::Replay;
 use hachi_posegraph::{Error, FactorKind, Graph, Isam2, Isam2Config};
+use hachi_runtime::Histogram;
 use serde::Serialize;
 
 use crate::cli::graph::{GraphOptimizeArguments, SolverArgument};
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
-use crate::latency::LatencyRecorder;
 use crate::{output, progress};
 
 /// Updates after the last pose, which take up what it left: as many as the peers are given.
@@ -185,7 +185,7 @@ fn pose_by_pose<G: Rigid>(
     let bar = progress::bar(Some(graph.len() as u64), "poses");
     let mut isam = Isam2::new(Isam2Config::default());
     let mut replay = Replay::new(graph);
-    let mut times = LatencyRecorder::new();
+    let times = Histogram::new();
     let mut total = Duration::ZERO;
     while let Some(step) = replay.next_step(&isam) {
         if cancelled.is_cancelled() {

@@ -1,0 +1,208 @@
+//! What stands around the robot, from the live cloud alone.
+//!
+//! In: one scan in the sensor's frame, and where the sensor is over the ground. Out: for each
+//! direction the nearest thing that rises over the ground, in the footprint frame. Nothing is
+//! remembered from scan to scan: what is there is seen again, ten times a second.
+//!
+//! All returns count, also those that mapping leaves out as reflections: to stop for a reflection
+//! costs a moment, to walk into a pane costs more. A thing has to return three shots from about
+//! the same place: a raindrop or a stray return stops nobody.
+
+use hachi_hal::{Point, Pose, Stamp};
+
+use crate::config::SafetyConfig;
+
+/// Directions: two degrees each. A leg of a chair at 1.5 m is as wide.
+pub const SECTORS: usize = 180;
+/// Distances that are told apart, metres.
+const BIN_M: f32 = 0.1;
+/// Farther away than this nothing stops the robot: it brakes within less than a metre.
+const BINS: usize = 50;
+/// Returns from about one place that make a thing.
+const SUPPORT: u16 = 3;
+
+/// The nearest things around the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacles {
+    /// When the scan ended.
+    pub stamp: Stamp,
+    /// How many there are.
+    len: usize,
+    /// Where they are: forward and left of the footprint, metres.
+    places: [[f32; 2]; SECTORS],
+}
+
+impl Obstacles {
+    /// Nothing around.
+    pub const fn none(stamp: Stamp) -> Self {
+        Self {
+            stamp,
+            len: 0,
+            places: [[0.0; 2]; SECTORS],
+        }
+    }
+
+    /// Where they are: forward and left of the footprint, metres.
+    pub fn places(&self) -> &[[f32; 2]] {
+        &self.places[..self.len]
+    }
+
+    /// One more thing; whether there was room for it.
+    pub fn add(&mut self, place: [f32; 2]) -> bool {
+        match self.places.get_mut(self.len) {
+            Some(free) => {
+                *free = place;
+                self.len += 1;
+                true
+            }
+            None => false,
+        }
+    }
+}
+
+/// Finds obstacles, scan after scan.
+#[derive(Debug, Clone)]
+pub struct ObstacleFinder {
+    half: [f32; 2],
+    low: f32,
+    high: f32,
+    /// Returns by direction and distance.
+    counts: Box<[[u16; BINS + 1]; SECTORS]>,
+}
+
+impl ObstacleFinder {
+    /// For a robot of this size.
+    pub fn new(config: &SafetyConfig) -> Self {
+        Self {
+            half: [config.half_length_m as f32, config.half_width_m as f32],
+            low: config.obstacle_low_m as f32,
+            high: config.obstacle_high_m as f32,
+            counts: Box::new([[0; BINS + 1]; SECTORS]),
+        }
+    }
+
+    /// The things that one scan shows.
+    pub fn find(
+        &mut self,
+        stamp: Stamp,
+        points: &[Point],
+        footprint_from_lidar: &Pose,
+    ) -> Obstacles {
+        for sector in self.counts.iter_mut() {
+            sector.fill(0);
+        }
+        let rotation = footprint_from_lidar
+            .rotation
+            .to_rotation_matrix()
+            .cast::<f32>();
+        let shift = footprint_from_lidar.translation.vector.cast::<f32>();
+        for point in points {
+            let p = rotation * nalgebra::Vector3::from(point.position()) + shift;
+            let rises = p.z > self.low && p.z < self.high;
+            let own = p.x.abs() < self.half[0] && p.y.abs() < self.half[1];
+            if rises && !own {
+                self.count(p.x, p.y);
+            }
+        }
+        let mut obstacles = Obstacles::none(stamp);
+        for (sector, counts) in self.counts.iter().enumerate() {
+            // What lies across the border of two bins is one thing.
+            let nearest = counts
+                .windows(2)
+                .position(|pair| pair[0] + pair[1] >= SUPPORT);
+            if let Some(bin) = nearest {
+                let bin = if counts[bin] == 0 { bin + 1 } else { bin };
+                obstacles.add(place(sector, bin));
+            }
+        }
+        obstacles
+    }
+
+    fn count(&mut self, x: f32, y: f32) {
+        let bin = (x.hypot(y) / BIN_M) as usize;
+        // A point that is not finite has no direction and falls into no bin.
+        if bin < BINS && x.is_finite() && y.is_finite() {
+            let turn = y.atan2(x) / std::f32::consts::TAU + 0.5;
+            let sector = ((turn * SECTORS as f32) as usize).min(SECTORS - 1);
+            let count = &mut self.counts[sector][bin];
+            *count = count.saturating_add(1);
+        }
+    }
+}
+
+/// The near edge of a bin in the middle of a sector.
+fn place(sector: usize, bin: usize) -> [f32; 2] {
+    let angle = ((sector as f32 + 0.5) / SECTORS as f32 - 0.5) * std::f32::consts::TAU;
+    let range = bin as f32 * BIN_M;
+    [range * angle.cos(), range * angle.sin()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Translation3;
+
+    fn point(x: f32, y: f32, z: f32) -> Point {
+        Point {
+            x,
+            y,
+            z,
+            ..Point::default()
+        }
+    }
+
+    /// The sensor 0.8 m over the ground.
+    fn mounted() -> Pose {
+        Pose::from_parts(
+            Translation3::new(0.0, 0.0, 0.8),
+            nalgebra::UnitQuaternion::identity(),
+        )
+    }
+
+    #[test]
+    fn a_post_is_seen_where_it_stands_and_floor_ceiling_and_the_own_body_are_not() {
+        let mut finder = ObstacleFinder::new(&SafetyConfig::default());
+        let post = [0.0, -0.2, -0.4].map(|z| point(1.53, 0.52, z));
+        let floor = [-0.79, -0.80, -0.75].map(|z| point(1.0, -0.5, z));
+        let ceiling = [1.5, 1.6, 1.7].map(|z| point(0.9, 0.0, z));
+        let body = [-0.2, -0.3, -0.4].map(|z| point(0.5, 0.2, z));
+        let all: Vec<_> = post
+            .into_iter()
+            .chain(floor)
+            .chain(ceiling)
+            .chain(body)
+            .collect();
+        let found = finder.find(Stamp::default(), &all, &mounted());
+        let [[x, y]] = found.places() else {
+            panic!("{found:?}");
+        };
+        assert!((x - 1.53).hypot(y - 0.52) < 0.11, "{x} {y}");
+        assert!(
+            x.hypot(*y) <= 1.53f32.hypot(0.52),
+            "never farther than it is"
+        );
+    }
+
+    #[test]
+    fn two_stray_returns_stop_nobody_and_neither_does_nonsense() {
+        let mut finder = ObstacleFinder::new(&SafetyConfig::default());
+        let bad = [f32::NAN, f32::INFINITY, f32::MAX].map(|v| point(v, v, 0.0));
+        let stray = [0.0, 0.05].map(|z| point(1.0, 0.0, z));
+        let all: Vec<_> = bad.into_iter().chain(stray).collect();
+        assert_eq!(
+            finder.find(Stamp::default(), &all, &mounted()).places(),
+            &[] as &[[f32; 2]]
+        );
+    }
+
+    #[test]
+    fn the_nearer_of_two_things_in_one_direction_counts() {
+        let mut finder = ObstacleFinder::new(&SafetyConfig::default());
+        let wall = (0..9).map(|i| point(3.0, 0.01, -0.05 * i as f32));
+        let pole = (0..3).map(|i| point(1.99, 0.01, -0.05 * i as f32));
+        let all: Vec<_> = wall.chain(pole).collect();
+        let found = finder.find(Stamp::default(), &all, &mounted());
+        assert_eq!(found.places().len(), 1);
+        assert!((found.places()[0][0] - 1.9).abs() < 0.01, "{found:?}");
+    }
+}

@@ -1,0 +1,503 @@
+//! The gate: each row of `docs/safety.md` that it answers for, by injecting the fault.
+
+use hachi_behaviour::{
+    Cause, GuardedBase, Obstacles, Patrol, PatrolConfig, PlaceEstimate, SafetyConfig, SafetyGate,
+    Sight, Verdict,
+};
+use hachi_hal::{
+    BaseAction, BaseCommand, BaseDrive, BodyPosture, BodyVelocity, Pose, Stamp, StopSample,
+};
+
+const MS: i64 = 1_000_000;
+const STEP_MS: i64 = 10;
+
+/// A robot that walks at full speed, all sensors in order; a test breaks something.
+struct Walk {
+    gate: SafetyGate,
+    now: Stamp,
+    sight: Sight,
+    obstacles: Obstacles,
+    wish: Option<BaseCommand>,
+    /// What is refreshed with each step.
+    live: Live,
+    /// Metres gone.
+    gone: f64,
+}
+
+#[derive(Clone, Copy)]
+struct Live {
+    localisation: bool,
+    lidar: bool,
+    camera: bool,
+    event_loop: bool,
+    robot: bool,
+    stop: bool,
+    wish: bool,
+}
+
+const ALL: Live = Live {
+    localisation: true,
+    lidar: true,
+    camera: true,
+    event_loop: true,
+    robot: true,
+    stop: true,
+    wish: true,
+};
+
+fn forward(speed: f64) -> BaseAction {
+    BaseAction::Move(BodyVelocity {
+        forward: speed,
+        ..BodyVelocity::ZERO
+    })
+}
+
+impl Walk {
+    fn new(config: SafetyConfig) -> Self {
+        Self {
+            gate: SafetyGate::new(config),
+            now: Stamp::from_nanos(1_000_000 * MS),
+            sight: Sight::default(),
+            obstacles: Obstacles::none(Stamp::default()),
+            wish: None,
+            live: ALL,
+            gone: 0.0,
+        }
+    }
+
+    /// Two seconds at the wish for full speed.
+    fn at_full_speed(config: SafetyConfig) -> Self {
+        let mut walk = Self::new(config);
+        for _ in 0..200 {
+            walk.step(forward(config.forward_m_per_s));
+        }
+        assert_eq!(walk.speed(), config.forward_m_per_s);
+        walk
+    }
+
+    fn step(&mut self, action: BaseAction) -> Verdict {
+        self.now = self.now + STEP_MS * MS;
+        let now = Some(self.now);
+        let (sight, live) = (&mut self.sight, self.live);
+        if live.localisation {
+            sight.localisation = now.map(|at| (at, true));
+        }
+        if live.lidar {
+            self.obstacles.stamp = self.now;
+        }
+        sight.camera = if live.camera { now } else { sight.camera };
+        sight.event_loop = if live.event_loop {
+            now
+        } else {
+            sight.event_loop
+        };
+        sight.robot = if live.robot { now } else { sight.robot };
+        if live.stop {
+            let pressed = sight.emergency_stop.is_some_and(|s| s.pressed);
+            sight.emergency_stop = now.map(|stamp| StopSample { stamp, pressed });
+        }
+        if live.wish {
+            self.wish = Some(BaseCommand {
+                stamp: self.now,
+                time_to_live_ns: 200 * MS,
+                action,
+            });
+        }
+        let verdict = self.gate.step(
+            self.now,
+            self.wish.as_ref(),
+            &self.sight,
+            Some(&self.obstacles),
+        );
+        self.gone += verdict.velocity().forward * STEP_MS as f64 * 1e-3;
+        verdict
+    }
+
+    fn speed(&mut self) -> f64 {
+        let last = match self.wish {
+            Some(wish) => wish.action,
+            None => BaseAction::Stop,
+        };
+        self.step(last).velocity().forward
+    }
+
+    /// Milliseconds until the velocity is zero, and the gravest cause then.
+    #[track_caller]
+    fn stops_within(&mut self, most_ms: i64, cause: Cause) {
+        let action = forward(self.gate.config().forward_m_per_s);
+        let mut stopped_after = None;
+        for ms in (STEP_MS..=2_000).step_by(STEP_MS as usize) {
+            let verdict = self.step(action);
+            if verdict.velocity().is_zero() && stopped_after.is_none() {
+                assert!(verdict.causes.has(cause), "stands for {}", verdict.causes);
+                stopped_after = Some(ms);
+            }
+            if stopped_after.is_some() {
+                assert!(verdict.velocity().is_zero(), "and stays so");
+            }
+        }
+        let after = stopped_after.expect("it stops");
+        assert!(after <= most_ms, "stopped after {after} ms, not {most_ms}");
+    }
+}
+
+/// Braking from 0.8 m/s at 1.6 m/s² takes half a second.
+const BRAKING_MS: i64 = 500 + 2 * STEP_MS;
+
+#[test]
+fn the_emergency_stop_wins_over_everything_at_once() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.sight.emergency_stop = Some(StopSample {
+        stamp: walk.now,
+        pressed: true,
+    });
+    walk.stops_within(STEP_MS, Cause::EmergencyStop);
+    // Not even standing up.
+    assert_eq!(
+        walk.step(BaseAction::StandUp).command.action,
+        BaseAction::Stop
+    );
+}
+
+#[test]
+fn a_silent_emergency_stop_is_taken_for_pressed() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.stop = false;
+    walk.stops_within(500 + STEP_MS, Cause::EmergencyStopSilent);
+}
+
+#[test]
+fn a_silent_robot_is_told_to_stand() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.robot = false;
+    walk.stops_within(250 + STEP_MS, Cause::RobotSilent);
+}
+
+#[test]
+fn a_behaviour_that_dies_takes_its_command_with_it() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.wish = false;
+    walk.stops_within(200 + BRAKING_MS, Cause::NoWish);
+}
+
+#[test]
+fn stale_localisation_stops_the_robot() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.localisation = false;
+    walk.stops_within(500 + BRAKING_MS, Cause::LocalisationStale);
+}
+
+#[test]
+fn lost_localisation_stops_the_robot() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.localisation = false;
+    walk.sight.localisation = Some((walk.now, false));
+    walk.stops_within(BRAKING_MS, Cause::LocalisationLost);
+}
+
+#[test]
+fn a_stale_lidar_stops_the_robot() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.lidar = false;
+    walk.stops_within(350 + BRAKING_MS, Cause::LidarStale);
+}
+
+#[test]
+fn a_frozen_camera_stops_a_robot_that_needs_it_and_no_other() {
+    let config = SafetyConfig {
+        camera_needed: true,
+        ..SafetyConfig::default()
+    };
+    let mut walk = Walk::at_full_speed(config);
+    walk.live.camera = false;
+    walk.stops_within(500 + BRAKING_MS, Cause::CameraStale);
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.camera = false;
+    (0..200).for_each(|_| assert!(walk.speed() > 0.0));
+}
+
+#[test]
+fn a_hanging_event_loop_stops_the_robot() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.event_loop = false;
+    walk.stops_within(250 + BRAKING_MS, Cause::EventLoopStale);
+}
+
+#[test]
+fn a_task_that_breaks_its_promise_holds_the_robot() {
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.sight.task_overrun = true;
+    walk.stops_within(STEP_MS, Cause::TaskOverrun);
+}
+
+#[test]
+fn not_a_number_moves_nothing() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut walk = Walk::at_full_speed(SafetyConfig::default());
+        let turning = BodyVelocity {
+            forward: 0.5,
+            left: 0.0,
+            yaw_rate: bad,
+        };
+        let verdict = walk.step(BaseAction::Move(turning));
+        assert!(verdict.velocity().is_zero() && verdict.causes.has(Cause::NotFinite));
+        let posture = BodyPosture {
+            roll: bad,
+            ..BodyPosture::default()
+        };
+        let verdict = walk.step(BaseAction::Pose(posture));
+        assert_eq!(verdict.command.action, BaseAction::Stop);
+    }
+}
+
+#[test]
+fn a_clock_that_jumps_stops_the_robot_both_ways() {
+    // The sensors' clock jumps ahead: what they say is not believed.
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.localisation = false;
+    walk.sight.localisation = Some((walk.now + 60_000 * MS, true));
+    walk.stops_within(BRAKING_MS, Cause::LocalisationStale);
+    // A behaviour's clock jumps ahead.
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.wish = false;
+    walk.wish = walk.wish.map(|wish| BaseCommand {
+        stamp: wish.stamp + 60_000 * MS,
+        ..wish
+    });
+    walk.stops_within(STEP_MS, Cause::FromTheFuture);
+    // And back.
+    let mut walk = Walk::at_full_speed(SafetyConfig::default());
+    walk.live.wish = false;
+    walk.wish = walk.wish.map(|wish| BaseCommand {
+        stamp: wish.stamp + -60_000 * MS,
+        ..wish
+    });
+    walk.stops_within(BRAKING_MS, Cause::NoWish);
+}
+
+#[test]
+fn it_stands_before_a_wall_that_comes_into_sight_with_the_margin_left() {
+    let config = SafetyConfig::default();
+    let mut walk = Walk::at_full_speed(config);
+    walk.gone = 0.0;
+    let wall_m = 3.0;
+    for _ in 0..800 {
+        let left = wall_m - walk.gone;
+        walk.obstacles = Obstacles::none(walk.now);
+        for side in [-0.2f32, 0.0, 0.2] {
+            assert!(walk.obstacles.add([left as f32, side]));
+        }
+        walk.step(forward(0.8));
+    }
+    let room = wall_m - walk.gone - config.half_length_m;
+    assert!(room >= config.margin_m - 0.02, "{room} m left");
+    assert!(
+        room < config.margin_m + 0.35,
+        "and comes near: {room} m left"
+    );
+    assert!(walk.step(forward(0.8)).causes.has(Cause::Obstacle));
+    // A person with a joystick meets the same gate; away from the wall it goes.
+    assert!(walk.step(forward(-0.3)).causes.is_empty());
+}
+
+#[test]
+fn a_followed_person_inside_the_safety_circle_stops_the_robot() {
+    let config = SafetyConfig::default();
+    // 1.4 x 0.8 m/s x 1 s.
+    assert!((config.safety_circle_m() - 1.12).abs() < 1e-12);
+    let mut walk = Walk::at_full_speed(config);
+    walk.sight.person = Some((walk.now, [1.2, 0.0]));
+    assert!(walk.step(forward(0.8)).causes.is_empty());
+    for _ in 0..60 {
+        walk.sight.person = Some((walk.now, [0.9, 0.6]));
+        walk.step(forward(0.8));
+    }
+    let verdict = walk.step(forward(0.8));
+    assert!(verdict.velocity().is_zero() && verdict.causes.has(Cause::PersonNear));
+    // A sighting expires.
+    for _ in 0..110 {
+        walk.step(forward(0.8));
+    }
+    assert!(walk.step(forward(0.8)).causes.is_empty());
+}
+
+#[test]
+fn speed_and_its_change_keep_to_the_limits() {
+    let config = SafetyConfig::default();
+    let mut walk = Walk::new(config);
+    let mut before = BodyVelocity::ZERO;
+    let dt_s = STEP_MS as f64 * 1e-3;
+    let wild = [
+        (9.0, 9.0, 9.0),
+        (-9.0, -9.0, -9.0),
+        (0.4, 0.0, -0.2),
+        (9.0, -9.0, 0.0),
+    ];
+    for i in 0..800 {
+        let (x, y, turn) = wild[i / 100 % wild.len()];
+        let verdict = walk.step(BaseAction::Move(BodyVelocity {
+            forward: x,
+            left: y,
+            yaw_rate: turn,
+        }));
+        let v = verdict.velocity();
+        assert_eq!(verdict.limited, x.abs() > 1.0);
+        assert!((-config.backward_m_per_s..=config.forward_m_per_s).contains(&v.forward));
+        assert!(v.left.abs() <= config.sideways_m_per_s);
+        assert!(v.yaw_rate.abs() <= config.turn_rad_per_s);
+        let braking = config.braking_m_per_s2 * dt_s + 1e-9;
+        let faster = config.acceleration_m_per_s2 * dt_s + 1e-9;
+        for (was, is) in [(before.forward, v.forward), (before.left, v.left)] {
+            assert!((is - was).abs() <= braking);
+            assert!(is.abs() - was.abs() <= faster);
+        }
+        let turning = config.turn_acceleration_rad_per_s2 * dt_s + 1e-9;
+        assert!((v.yaw_rate - before.yaw_rate).abs() <= turning);
+        before = v;
+    }
+    // After a pause it does not leap.
+    let mut walk = Walk::new(config);
+    walk.step(BaseAction::Stop);
+    walk.now = walk.now + 30_000 * MS;
+    assert!(
+        walk.step(forward(0.8)).velocity().forward <= 0.1 * config.acceleration_m_per_s2 + 1e-9
+    );
+}
+
+#[test]
+fn nothing_known_moves_nothing() {
+    let mut gate = SafetyGate::new(SafetyConfig::default());
+    let now = Stamp::from_nanos(5_000 * MS);
+    let wish = BaseCommand {
+        stamp: now,
+        time_to_live_ns: 200 * MS,
+        action: forward(0.5),
+    };
+    let verdict = gate.step(now, Some(&wish), &Sight::default(), None);
+    assert_eq!(verdict.command.action, BaseAction::Stop);
+    for cause in [
+        Cause::EmergencyStopSilent,
+        Cause::RobotSilent,
+        Cause::LocalisationStale,
+        Cause::LidarStale,
+        Cause::EventLoopStale,
+    ] {
+        assert!(verdict.causes.has(cause), "{cause:?}");
+    }
+}
+
+/// A base that keeps what it was told.
+#[derive(Default)]
+struct Told(Vec<BaseCommand>);
+
+impl BaseDrive for Told {
+    type Error = std::convert::Infallible;
+    fn command(&mut self, command: &BaseCommand, _: Stamp) -> Result<(), Self::Error> {
+        self.0.push(*command);
+        Ok(())
+    }
+    fn service(&mut self, now: Stamp) -> Result<hachi_hal::BaseStatus, Self::Error> {
+        let last = self.0.last().filter(|c| c.is_alive(now));
+        let velocity = match last.map(|c| c.action) {
+            Some(BaseAction::Move(velocity)) => velocity,
+            _ => BodyVelocity::ZERO,
+        };
+        Ok(hachi_hal::BaseStatus {
+            stamp: now,
+            velocity,
+            expired: last.is_none(),
+            saturated: false,
+        })
+    }
+}
+
+#[test]
+fn what_a_behaviour_wishes_reaches_the_base_only_as_the_gate_lets_it() {
+    let mut base = GuardedBase::new(SafetyGate::new(SafetyConfig::default()), Told::default());
+    let now = Stamp::from_nanos(5_000 * MS);
+    let wish = BaseCommand {
+        stamp: now,
+        time_to_live_ns: i64::MAX,
+        action: forward(100.0),
+    };
+    let moved = base
+        .step(now, Some(&wish), &Sight::default(), None)
+        .unwrap();
+    assert!(moved.status.velocity.is_zero());
+    assert_eq!(moved.verdict.command.time_to_live_ns, 200 * MS);
+}
+
+/// On a robot that does what it is told, the patrol goes round its places and stops where it is
+/// lost.
+#[test]
+fn a_patrol_reaches_its_places_in_turn() {
+    let places = vec![[2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 0.0]];
+    let mut patrol = Patrol::new(PatrolConfig {
+        places: places.clone(),
+        ..PatrolConfig::default()
+    });
+    let mut walk = Walk::new(SafetyConfig::default());
+    let (mut x, mut y, mut heading) = (0.0f64, 0.0f64, 1.0f64);
+    let mut visits = Vec::new();
+    for _ in 0..6_000 {
+        let place = PlaceEstimate {
+            stamp: walk.now,
+            map_from_base: Pose::new(
+                hachi_hal::Vector3::new(x, y, 0.6),
+                hachi_hal::Vector3::z() * heading,
+            ),
+            trusted: true,
+        };
+        let wish = patrol.step(walk.now, &place).unwrap();
+        let v = walk.step(wish.action).velocity();
+        let dt_s = STEP_MS as f64 * 1e-3;
+        x += v.forward * heading.cos() * dt_s;
+        y += v.forward * heading.sin() * dt_s;
+        heading += v.yaw_rate * dt_s;
+        let near = places.iter().position(|p| (p[0] - x).hypot(p[1] - y) < 0.4);
+        if let Some(near) = near.filter(|n| visits.last() != Some(n)) {
+            visits.push(near);
+        }
+        let lost = PlaceEstimate {
+            trusted: false,
+            ..place
+        };
+        assert_eq!(patrol.step(walk.now, &lost), None);
+    }
+    assert!(patrol.rounds() >= 2, "{}", patrol.rounds());
+    // It starts where the last place is.
+    assert_eq!(visits[..9], [3, 0, 1, 2, 3, 0, 1, 2, 3]);
+}
+
+#[test]
+fn limits_that_cannot_work_are_refused_by_name() {
+    assert_eq!(SafetyConfig::default().check(), Ok(()));
+    let wrong = [
+        SafetyConfig {
+            forward_m_per_s: f64::NAN,
+            ..SafetyConfig::default()
+        },
+        SafetyConfig {
+            lidar_stale_s: 350.0,
+            ..SafetyConfig::default()
+        },
+        SafetyConfig {
+            half_length_m: 650.0,
+            ..SafetyConfig::default()
+        },
+        SafetyConfig {
+            turn_rad_per_s: 40.0,
+            ..SafetyConfig::default()
+        },
+    ];
+    let keys = wrong.map(|config| config.check().unwrap_err().key);
+    assert_eq!(
+        keys,
+        [
+            "forward_m_per_s",
+            "lidar_stale_s",
+            "half_length_m",
+            "turn_rad_per_s"
+        ]
+    );
+}
