@@ -6,6 +6,9 @@ use std::fs;
 use std::io::Result;
 use std::path::Path;
 
+use hachi_hal::{Distortion, Intrinsics, Pose};
+use hachi_realsense::encode as d400;
+use hachi_realsense::frame as d400_frame;
 use hachi_robosense::encode as helios;
 use hachi_robosense::packet as helios_packet;
 use hachi_unitree::frame as unitree;
@@ -147,6 +150,45 @@ fn unitree_commands(layout: &unitree::Layout) -> [Vec<u8>; 2] {
     [high.as_bytes().to_vec(), low.as_bytes().to_vec()]
 }
 
+/// A camera's tables, one answer, one metadata buffer, one picture; and commands for a stream of
+/// pictures with their metadata.
+fn realsense() -> Vec<Vec<u8>> {
+    let optics = Intrinsics {
+        width: 848,
+        height: 480,
+        focal: [424.2, 424.3],
+        centre: [423.4, 236.1],
+        distortion: Distortion::BrownConrady([-0.05, 0.06, 0.0, 0.001, -0.02]),
+    };
+    let timing = d400_frame::CaptureTiming {
+        sensor_us: Some(7_000),
+        exposure_us: Some(6_000),
+        ..d400_frame::CaptureTiming::default()
+    };
+    let said = d400_frame::FrameMetadata {
+        device_us: Some(10_000),
+        timing,
+        depth: Some(d400_frame::DepthState::default()),
+        ..d400_frame::FrameMetadata::default()
+    };
+    let (metadata, len) = d400::metadata(&said);
+    let mut picture = vec![8, 0, 4, 0, 16, 0];
+    picture.extend([0xE8, 3].repeat(32));
+    let opcode = hachi_realsense::monitor::Opcode::ReadCalibration;
+    let decoded = [
+        d400::depth_table(0.095, &[optics]).to_vec(),
+        d400::color_table(&optics, &Pose::translation(0.06, 0.0, 0.0)).to_vec(),
+        d400::answer(opcode, &[1, 2, 3]).to_vec(),
+        metadata[..len].to_vec(),
+        picture,
+    ];
+    // Depth, its metadata, colour, its metadata; 33 ms in four steps.
+    let pair = [0x0C, 80, 0x0E, 80, 0x0D, 80, 0x0F, 80];
+    let streamed = [vec![1, 0, 0, 0], pair.repeat(12)].concat();
+    let inputs = decoded.into_iter().map(|bytes| with_switches(0, bytes));
+    inputs.chain([streamed]).collect()
+}
+
 /// Numbers of a walk: bytes around the middle stand for joints near zero.
 fn leg_numbers() -> Vec<u8> {
     (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
@@ -166,7 +208,8 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 11] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 13] = [
+        ("realsense", realsense()),
         (
             "velodyne_packet",
             vec![
@@ -211,6 +254,14 @@ fn main() -> Result<()> {
             ],
         ),
         ("leg_tracker", vec![leg_numbers()]),
+        (
+            "mot_text",
+            vec![
+                b"1,-1,10,20,30,60,0.9,-1,-1,-1\n2,-1,12,20,30,60,0.8\n3,-1,14,20,30,60,0.9\n"
+                    .to_vec(),
+                b"1 1 5 5 10 20 1 1 1\n1,2,40,5,10,20,0,7,0.5\n\n# end\n".to_vec(),
+            ],
+        ),
         (
             "nmea",
             vec![

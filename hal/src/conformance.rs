@@ -5,13 +5,15 @@
 //! the checks themselves hold no memory but the caller's.
 //!
 //! The promises are those written beside the traits: sensors' here, in the order of
-//! [`crate::device`], a robot's body in `robot`. [`ScanPromise`] and
+//! [`crate::device`], cameras' in `camera`, a robot's body in `robot`. [`ScanPromise`] and
 //! [`SamplePromise`] can also be fed by hand, next to other work on the same stream.
 
+mod camera;
 mod robot;
 
 use core::fmt;
 
+pub use camera::{FramePromise, check_rgbd_camera};
 pub use robot::{
     BaseViolation, LegViolation, check_base_drive, check_battery, check_emergency_stop,
     check_leg_kinematics, check_legs,
@@ -117,6 +119,16 @@ pub enum Violation {
     SampleNotFinite {
         /// Stamp of the sample.
         stamp: Stamp,
+    },
+    /// A frame came without geometry, or with one that no camera can have.
+    NoGeometry {
+        /// The frame's sequence number.
+        sequence: u32,
+    },
+    /// A frame was delivered into images that have no room for it.
+    CutFrame {
+        /// Depth counts and colour bytes that there was room for.
+        room: [usize; 2],
     },
 }
 

@@ -12,6 +12,7 @@
 //! | [`point`] | [`Point`]: one LiDAR return; [`PointSink`]: where decoders put them |
 //! | [`scan`] | [`ScanHeader`]: one turn of a LiDAR |
 //! | [`geometry`] | [`Pose`] and friends |
+//! | [`camera`] | colour and depth images; [`RgbdCamera`] |
 //! | [`imu`], [`motion`] | inertial samples, external odometry |
 //! | [`legs`] | joints and feet of a quadruped; [`LegKinematics`] |
 //! | [`base`] | commands to a base, which die of age; [`BaseDrive`] |
@@ -25,6 +26,7 @@
 extern crate alloc;
 
 pub mod base;
+pub mod camera;
 pub mod device;
 pub mod geometry;
 pub mod imu;
@@ -44,6 +46,7 @@ pub mod mock;
 pub use base::{
     BaseAction, BaseCommand, BaseDrive, BaseStatus, BodyPosture, BodyVelocity, CommandFault,
 };
+pub use camera::{Distortion, Intrinsics, RgbdCamera, RgbdGeometry, RgbdHeader, RgbdImages};
 pub use device::{Clock, DeviceError, FaultKind, Imu, LidarScans, PacketSource, Received};
 pub use geometry::{Pose, Rotation, Vector3};
 pub use imu::ImuSample;

@@ -18,6 +18,7 @@
 //! source.assert_done();
 //! ```
 
+mod camera;
 mod robot;
 
 use core::fmt;
@@ -28,6 +29,7 @@ use crate::{
     ScanHeader, Stamp,
 };
 
+pub use camera::{MockCamera, Shot};
 pub use robot::{MockBase, MockBattery, MockEmergencyStop, MockLegs, MockWatchdog};
 
 /// What a scripted device does on one call.
@@ -54,6 +56,13 @@ pub enum MockError {
         /// Bytes of the buffer.
         capacity: usize,
     },
+    /// The caller's images have less room than the scripted frame.
+    SmallImages {
+        /// Depth counts and colour bytes of the frame.
+        needed: [usize; 2],
+        /// Room for them.
+        given: [usize; 2],
+    },
     /// The sink took fewer points than the scripted scan has.
     SinkFull {
         /// Points of the scan.
@@ -68,6 +77,11 @@ impl fmt::Display for MockError {
             Self::Oversize { len, capacity } => {
                 write!(f, "a datagram of {len} bytes does not fit in {capacity}")
             }
+            Self::SmallImages { needed, given } => write!(
+                f,
+                "a frame of {} counts and {} bytes does not fit in {} and {}",
+                needed[0], needed[1], given[0], given[1]
+            ),
             Self::SinkFull { points } => write!(f, "the sink did not take {points} points"),
         }
     }
@@ -80,7 +94,7 @@ impl DeviceError for MockError {
         match self {
             Self::Scripted(kind) => *kind,
             Self::Oversize { .. } => FaultKind::ReadAgain,
-            Self::SinkFull { .. } => FaultKind::FixConfig,
+            Self::SinkFull { .. } | Self::SmallImages { .. } => FaultKind::FixConfig,
         }
     }
 }

@@ -5,10 +5,12 @@ use std::cell::Cell;
 
 use hachi_hal::conformance::{
     Violation, check_imu, check_lidar_scans, check_packet_source, check_refuses_to_cut,
+    check_rgbd_camera,
 };
-use hachi_hal::mock::{MockImu, MockLidar, MockPackets, Packet, Scan, Step};
+use hachi_hal::mock::{MockCamera, MockImu, MockLidar, MockPackets, Packet, Scan, Shot, Step};
 use hachi_hal::{
-    Clock, FaultKind, ImuSample, PacketSource, Point, Received, ScanHeader, Stamp, Vector3,
+    Clock, Distortion, FaultKind, ImuSample, Intrinsics, PacketSource, Point, Pose, Received,
+    RgbdGeometry, RgbdHeader, ScanHeader, Stamp, Vector3,
 };
 
 /// A clock that moves by a fixed amount each time it is read.
@@ -232,4 +234,97 @@ fn imu_stamps_that_repeat_and_values_that_are_not_finite_are_refused() {
         stamp: Stamp::from_nanos(5),
     };
     assert_eq!(run(&[sample(5, f64::NAN)]), Err(not_finite));
+}
+
+fn small_camera() -> RgbdGeometry {
+    let pixels = |width, height| Intrinsics {
+        width,
+        height,
+        focal: [2.0, 2.0],
+        centre: [0.5, 0.5],
+        distortion: Distortion::None,
+    };
+    RgbdGeometry {
+        depth: pixels(2, 2),
+        color: pixels(2, 1),
+        color_from_depth: Pose::translation(0.05, 0.0, 0.0),
+        depth_unit_m: 0.001,
+    }
+}
+
+fn shot(sequence: u32, nanos: i64) -> Step<Shot<'static>> {
+    Step::Batch(Shot {
+        header: RgbdHeader {
+            sequence,
+            stamp: Stamp::from_nanos(nanos),
+            ..RgbdHeader::default()
+        },
+        depth: &[1, 2, 3, 4],
+        color: &[1, 2, 3, 4, 5, 6],
+    })
+}
+
+fn check_camera(
+    geometry: RgbdGeometry,
+    script: &[Step<Shot<'static>>],
+    room: [usize; 2],
+) -> Result<hachi_hal::conformance::Tally, Violation> {
+    let mut camera = MockCamera::script(geometry, script);
+    let (mut depth, mut color) = ([0; 8], [0; 8]);
+    let images = (&mut depth[..room[0]], &mut color[..room[1]]);
+    let tally = check_rgbd_camera(&mut camera, &clock(1), images, script.len(), 1_000)?;
+    camera.assert_done();
+    Ok(tally)
+}
+
+#[test]
+fn a_camera_that_keeps_its_promise_is_tallied() {
+    // The second shot is spent on the refusal to cut it.
+    let script = [
+        shot(0, 10),
+        shot(0, 10),
+        Step::Nothing,
+        shot(1, 20),
+        Step::Fault(FaultKind::Reopen),
+        shot(2, 21),
+    ];
+    let tally = check_camera(small_camera(), &script, [4, 6]).unwrap();
+    assert_eq!((tally.items, tally.faults, tally.nothing), (3, 2, 1));
+}
+
+#[test]
+fn broken_promises_of_cameras_are_named() {
+    let skipped = check_camera(
+        small_camera(),
+        &[shot(0, 10), shot(0, 0), shot(2, 20)],
+        [4, 6],
+    );
+    assert_eq!(
+        skipped,
+        Err(Violation::Sequence {
+            expected: 1,
+            got: 2
+        })
+    );
+    let stamp = Stamp::from_nanos(10);
+    let still = check_camera(
+        small_camera(),
+        &[shot(0, 10), shot(0, 0), shot(1, 10)],
+        [4, 6],
+    );
+    assert_eq!(
+        still,
+        Err(Violation::StampNotIncreasing {
+            before: stamp,
+            stamp
+        })
+    );
+    let mut blind = small_camera();
+    blind.depth.focal[0] = f64::NAN;
+    let blind = check_camera(blind, &[shot(7, 10)], [4, 6]);
+    assert_eq!(blind, Err(Violation::NoGeometry { sequence: 7 }));
+    let mut large = small_camera();
+    large.depth.width = 3;
+    let cut = check_camera(large, &[shot(0, 10)], [4, 6]);
+    assert_eq!(cut, Err(Violation::CutFrame { room: [4, 6] }));
 }

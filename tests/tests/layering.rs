@@ -51,6 +51,13 @@ const LAYERS: &[Layer] = &[
                   from any source, so only its tests name one",
     },
     Layer {
+        name: "hachi-realsense",
+        sees: &["hachi-hal", "hachi-turns"],
+        tests_see: &[],
+        because: "a driver knows its device: no other maker, no robot, no service; a camera's clock \
+                  is moved onto the robot's as a LiDAR's is",
+    },
+    Layer {
         name: "hachi-unitree",
         sees: &["hachi-hal", "hachi-datagram"],
         tests_see: &["hachi-b1", "hachi-go1"],
@@ -129,6 +136,12 @@ const LAYERS: &[Layer] = &[
         sees: &["hachi-hal"],
         tests_see: &[],
         because: "errors are measured on poses, whoever estimated them",
+    },
+    Layer {
+        name: "hachi-people",
+        sees: &[],
+        tests_see: &[],
+        because: "people are followed in any images: usable by someone who has never heard of this robot",
     },
     Layer {
         name: "hachi-bridge",

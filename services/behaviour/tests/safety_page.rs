@@ -36,8 +36,9 @@ fn every_row_names_a_test_that_exists() {
         for name in row[5].split(", ").map(|name| name.trim_matches('`')) {
             let test = format!("fn {name}()");
             assert!(
-            TESTS.iter().any(|file| file.contains(&test)),
-            "no test {name}"
-        );
+                TESTS.iter().any(|file| file.contains(&test)),
+                "no test {name}"
+            );
+        }
     }
 }

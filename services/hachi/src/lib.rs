@@ -16,6 +16,7 @@
 //! | [`service`] | the service on a robot, task by task |
 //! | [`config`] | settings |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
+//! | [`mot_files`] | files of boxes and tracks |
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
 //! | [`task_table`] | the task table as people read it |
@@ -32,6 +33,7 @@ pub mod log;
 pub mod map_builder;
 pub mod map_picture;
 pub mod mapping;
+pub mod mot_files;
 pub mod motion_samples;
 pub mod output;
 pub mod precision_recall_picture;
