@@ -180,7 +180,7 @@ pub struct EvalRegistrationArguments {
     pub json: bool,
 }
 
-fn world(name: &str) -> Result<Preset, String> {
+pub(super) fn world(name: &str) -> Result<Preset, String> {
     Preset::from_name(name).ok_or_else(|| {
         let names = Preset::ALL.map(Preset::name).join(", ");
         format!("there is no such world; choose one of {names}")
