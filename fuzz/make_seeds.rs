@@ -11,6 +11,8 @@ use hachi_realsense::encode as d400;
 use hachi_realsense::frame as d400_frame;
 use hachi_robosense::encode as helios;
 use hachi_robosense::packet as helios_packet;
+use hachi_robotiq::frame as robotiq_frame;
+use hachi_robotiq::serve as robotiq_serve;
 use hachi_unitree::frame as unitree;
 use hachi_velodyne::encode as vlp16;
 use hachi_velodyne::packet as vlp16_packet;
@@ -189,6 +191,39 @@ fn realsense() -> Vec<Vec<u8>> {
     inputs.chain([streamed]).collect()
 }
 
+/// A request and an answer of a gripper; and the answers to two writes and two reads in pieces.
+fn robotiq() -> Vec<Vec<u8>> {
+    let command = robotiq_frame::Command {
+        activate: true,
+        go: true,
+        position: 255,
+        ..robotiq_frame::Command::default()
+    };
+    let state = robotiq_frame::State {
+        activate: true,
+        activation: robotiq_frame::Activation::Done,
+        ..robotiq_frame::State::default()
+    };
+    let written = robotiq_serve::Asked::Write {
+        command,
+        registers: 3,
+    };
+    let read = robotiq_serve::Asked::Read {
+        function: 3,
+        registers: 3,
+    };
+    let [written, read] = [written, read].map(|a| robotiq_serve::answer(9, a, &state).to_vec());
+    let pieces = |frame: &[u8]| [vec![frame.len() as u8], frame.to_vec()].concat();
+    let conversation = [&written, &written, &read, &read, &written].map(|f| pieces(f));
+    vec![
+        robotiq_frame::Request::Write(command).encode(9).to_vec(),
+        robotiq_frame::Request::Read.encode(9).to_vec(),
+        written.clone(),
+        read.clone(),
+        [vec![0x80], conversation.concat()].concat(),
+    ]
+}
+
 /// Numbers of a walk: bytes around the middle stand for joints near zero.
 fn leg_numbers() -> Vec<u8> {
     (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
@@ -208,8 +243,9 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 12] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 13] = [
         ("realsense", realsense()),
+        ("robotiq", robotiq()),
         (
             "velodyne_packet",
             vec![
