@@ -291,6 +291,14 @@ fn main() -> Result<()> {
         ),
         ("leg_tracker", vec![leg_numbers()]),
         (
+            "mot_text",
+            vec![
+                b"1,-1,10,20,30,60,0.9,-1,-1,-1\n2,-1,12,20,30,60,0.8\n3,-1,14,20,30,60,0.9\n"
+                    .to_vec(),
+                b"1 1 5 5 10 20 1 1 1\n1,2,40,5,10,20,0,7,0.5\n\n# end\n".to_vec(),
+            ],
+        ),
+        (
             "nmea",
             vec![
                 SENTENCE.to_vec(),

@@ -144,6 +144,12 @@ const LAYERS: &[Layer] = &[
         because: "errors are measured on poses, whoever estimated them",
     },
     Layer {
+        name: "hachi-people",
+        sees: &[],
+        tests_see: &[],
+        because: "people are followed in any images: usable by someone who has never heard of this robot",
+    },
+    Layer {
         name: "hachi-bridge",
         sees: &["hachi-hal"],
         tests_see: &[],

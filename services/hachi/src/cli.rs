@@ -6,6 +6,7 @@ pub mod graph;
 pub mod loops;
 pub mod map;
 pub mod mapping;
+pub mod people;
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -46,6 +47,9 @@ pub enum Command {
     /// Work on pose graphs.
     #[command(subcommand)]
     Graph(graph::Graph),
+    /// Follow people in images.
+    #[command(subcommand)]
+    People(people::People),
     /// Check what is installed, what can be opened, and what rights hachi has here.
     Doctor(DoctorArguments),
 }
@@ -60,6 +64,8 @@ pub enum Eval {
     Loops(loops::EvalLoopsArguments),
     /// Align two clouds with GICP.
     Registration(mapping::EvalRegistrationArguments),
+    /// How well people were followed: MOTA, IDF1 and their parts.
+    Tracks(people::EvalTracksArguments),
     /// Absolute and relative pose error of a trajectory, as evo computes them.
     Trajectory(EvalTrajectoryArguments),
 }

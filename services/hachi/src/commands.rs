@@ -5,9 +5,11 @@ pub mod demo;
 pub mod doctor;
 pub mod eval_loops;
 pub mod eval_registration;
+pub mod eval_tracks;
 pub mod eval_trajectory;
 pub mod graph_optimize;
 pub mod map;
+pub mod people;
 pub mod replay;
 
 use crate::cli::graph::Graph;
@@ -25,9 +27,11 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Eval(Eval::Loops(arguments)) => eval_loops::run(&arguments),
         Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
+        Command::Eval(Eval::Tracks(arguments)) => eval_tracks::run(&arguments),
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
         Command::Map(command) => map::run(&command),
         Command::Graph(Graph::Optimize(arguments)) => graph_optimize::run(&arguments),
+        Command::People(command) => people::run(&command),
         Command::Doctor(arguments) => doctor::run(&arguments),
     }
 }

@@ -14,6 +14,7 @@
 //! | [`recording`], [`motion_samples`] | recordings of any kind as scans and samples |
 //! | [`config`] | settings |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
+//! | [`mot_files`] | files of boxes and tracks |
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
 //! | [`results`] | the files of a run |
@@ -29,6 +30,7 @@ pub mod log;
 pub mod map_builder;
 pub mod map_picture;
 pub mod mapping;
+pub mod mot_files;
 pub mod motion_samples;
 pub mod output;
 pub mod precision_recall_picture;

@@ -84,7 +84,8 @@ pub enum CloudFormat {
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 INPUT is a pcap or pcapng capture, a ROS 2 bag (db3, mcap), a ROS 1 bag, a KITTI sequence folder, or a \
-folder of .bin, .pcd or .ply scans in numeric order with optional times.txt (seconds).
+folder of .bin, .pcd or .ply scans in numeric order with optional times.txt (seconds). In a KITTI \
+sequence with its calib.txt the LiDAR's vertical angles are corrected by 0.205 degrees, as is usual.
 
 Example:
   hachi replay drive.pcap --out out/drive --stage slam --map drive.map")]

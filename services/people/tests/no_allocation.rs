@@ -1,0 +1,97 @@
+//! Once warm, following twenty people allocates nothing, and takes little time.
+#![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
+#![allow(
+    clippy::print_stdout,
+    reason = "the time is printed, not judged: the machine is shared"
+)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use hachi_people::BoundingBox;
+use hachi_people::track::{Detection, Features, Frame, Tracker, TrackerConfig};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is handed to the system's allocator unchanged; counting touches no memory.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(at, layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const PEOPLE: usize = 20;
+const DIMENSION: usize = 512;
+/// Frames until the scene has shown all it has: afterwards frames are counted.
+const CYCLES: usize = 2000;
+
+/// Twenty people who walk to and fro at their own pace, cross, and are hidden now and then.
+fn people_at(frame: usize, detections: &mut Vec<Detection>, features: &mut Vec<f32>) {
+    detections.clear();
+    features.clear();
+    for person in 0..PEOPLE {
+        if (frame + 13 * person) % 60 < 4 {
+            continue;
+        }
+        let pace = 0.02 + 0.001 * person as f64;
+        let x = 600.0 + 500.0 * (pace * frame as f64 + person as f64).sin();
+        detections.push(Detection {
+            bounding_box: BoundingBox::new(x, 100.0 + 8.0 * person as f64, 60.0, 150.0),
+            score: if (frame + person).is_multiple_of(7) {
+                0.3
+            } else {
+                0.9
+            },
+        });
+        features.extend((0..DIMENSION).map(|k| f32::from(k % PEOPLE == person) / 5.1));
+    }
+}
+
+#[test]
+fn twenty_people_cost_no_memory_once_warm() {
+    let mut tracker = Tracker::new(TrackerConfig::default());
+    let (mut detections, mut features) = (Vec::new(), Vec::new());
+    let mut allocations = 0;
+    let mut times_ms = Vec::with_capacity(CYCLES);
+    for frame in 0..2 * CYCLES {
+        people_at(frame, &mut detections, &mut features);
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let begun = Instant::now();
+        tracker.step(&Frame {
+            dt_s: 1.0 / 30.0,
+            detections: &detections,
+            features: Some(Features {
+                dimension: DIMENSION,
+                values: &features,
+                same_person_distance: 0.5,
+            }),
+            image_motion: None,
+        });
+        if frame >= CYCLES {
+            allocations += ALLOCATIONS.load(Ordering::Relaxed) - before;
+            times_ms.push(begun.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    times_ms.sort_by(f64::total_cmp);
+    println!("median step: {:.3} ms", times_ms[times_ms.len() / 2]);
+    assert_eq!(allocations, 0, "allocations");
+    let believed = tracker.tracks().iter().filter(|t| t.is_confirmed());
+    assert_eq!(believed.count(), PEOPLE);
+}
