@@ -224,6 +224,29 @@ fn robotiq() -> Vec<Vec<u8>> {
     ]
 }
 
+/// A stop's node that starts, closes its contacts, is pressed and falls silent; an axis's messages.
+fn canbus() -> Vec<Vec<u8>> {
+    let frame = |id: u16, ticks: u8, bytes: &[u8]| {
+        let [high, low] = id.to_be_bytes();
+        [&[high, low, bytes.len() as u8, ticks], bytes].concat()
+    };
+    let stop = [
+        frame(0x701, 0, &[0]),
+        frame(0x701, 50, &[5]),
+        frame(0x181, 1, &[3]),
+        frame(0x701, 50, &[5]),
+        frame(0x181, 10, &[0]),
+        frame(0x081, 1, &[0x20, 0x81]),
+        frame(0x7E8, 255, &[]),
+    ];
+    let axis = [
+        frame(0x021, 0, &[0, 0, 0, 0, 8, 0, 0, 0x80]),
+        frame(0x029, 1, &[0, 0, 0x80, 0x3F, 0, 0, 0, 0xC0]),
+        frame(0x037, 1, &[0, 0, 0xC0, 0x41, 0, 0, 0, 0x3F]),
+    ];
+    vec![stop.concat(), axis.concat()]
+}
+
 /// Numbers of a walk: bytes around the middle stand for joints near zero.
 fn leg_numbers() -> Vec<u8> {
     (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
@@ -243,7 +266,8 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 13] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 14] = [
+        ("canbus", canbus()),
         ("realsense", realsense()),
         ("robotiq", robotiq()),
         (
