@@ -32,6 +32,9 @@ pub struct DemoArguments {
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
     pub stage: StageArgument,
+    /// Keep the map in this file, or go on with the one that is there.
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
     /// What it carries: vlp16, vlp16-dual or helios16p.
     #[arg(long, value_name = "NAME", default_value = "vlp16", value_parser = sensor)]
     pub sensor: SensorKind,
@@ -177,7 +180,7 @@ pub struct EvalRegistrationArguments {
     pub json: bool,
 }
 
-fn world(name: &str) -> Result<Preset, String> {
+pub(super) fn world(name: &str) -> Result<Preset, String> {
     Preset::from_name(name).ok_or_else(|| {
         let names = Preset::ALL.map(Preset::name).join(", ");
         format!("there is no such world; choose one of {names}")

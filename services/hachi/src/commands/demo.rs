@@ -1,7 +1,6 @@
 //! `hachi demo`: the simulated robot through the whole pipeline, compared with the truth.
 
 use hachi_bridge::message::Sensor;
-use hachi_slam::{MemoryStore, Slam};
 use hachi_trajectory::plot::Plot;
 use hachi_trajectory::{Alignment, Evaluation, EvaluationOptions, Trajectory, evaluate};
 use hachi_world::{SensorKind, SimulatedLidar, Simulation, SimulationConfig};
@@ -19,7 +18,7 @@ use crate::results::Results;
 use crate::slam_stage::SlamStage;
 use crate::{output, progress};
 
-use super::replay::{first_failure, thread_pool};
+use super::replay::{first_failure, slam, thread_pool};
 
 /// The VLP-16 turns ten times a second.
 const SCANS_PER_SECOND: f64 = 10.0;
@@ -64,11 +63,13 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     };
     let lidar = SimulatedLidar::new(Simulation::new(world.clone()));
     let mut source = from_packets(driver, lidar, |_| Vec::new());
-    let slam_config = config.slam.clone();
+    let slam = match arguments.stage {
+        StageArgument::Odometry => None,
+        StageArgument::Slam => Some(slam(arguments.map.as_deref(), None, &config)?),
+    };
     let mut mapping = Mapping::new(config, results.folder())?;
-    if arguments.stage == StageArgument::Slam {
-        let store = Box::new(MemoryStore::default());
-        mapping = mapping.with_slam(Slam::new(slam_config, store));
+    if let Some(slam) = slam {
+        mapping = mapping.with_slam(slam);
     }
 
     let pool = thread_pool(None)?;
