@@ -254,6 +254,18 @@ fn canbus() -> Vec<Vec<u8>> {
     vec![stop.concat(), axis.concat()]
 }
 
+/// A measurement; and reads of a chip that is not ready, ready with a measurement, and failing.
+fn imu() -> Vec<Vec<u8>> {
+    let at_rest = vec![0, 0, 0, 0, 0, 0, 0x10, 0, 0, 0, 0, 0, 0, 164];
+    let reads = [
+        vec![0, 0, 0, 0, 0, 8, 0],
+        at_rest.clone(),
+        vec![0xFF, 0, 8, 0],
+        at_rest.clone(),
+    ];
+    vec![at_rest, reads.concat()]
+}
+
 /// Numbers of a walk: bytes around the middle stand for joints near zero.
 fn leg_numbers() -> Vec<u8> {
     (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
@@ -345,8 +357,9 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 18] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 19] = [
         ("canbus", canbus()),
+        ("imu", imu()),
         ("realsense", realsense()),
         ("robotiq", robotiq()),
         (

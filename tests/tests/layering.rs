@@ -70,6 +70,12 @@ const LAYERS: &[Layer] = &[
         because: "a driver knows its device: no other maker, no robot, no service",
     },
     Layer {
+        name: "hachi-imu",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "a driver knows its device: no other maker, no robot, no service",
+    },
+    Layer {
         name: "hachi-unitree",
         sees: &["hachi-hal", "hachi-datagram"],
         tests_see: &["hachi-b1", "hachi-go1"],
