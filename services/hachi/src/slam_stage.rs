@@ -242,8 +242,8 @@ pub fn ledger_table(map: &Map, scan_of: impl Fn(NodeId) -> Option<usize>) -> Str
 
 /// Heading of the ledger's table.
 pub const LEDGER_HEADING: &str = "from_scan,to_scan,accepted,reason,id,node,candidate,found_by,\
-distance_m,similarity,yaw_rad,graph_fitness,looks_fitness,overlap,inlier_share,residual_m,open,chi2,\
-agreeing,x_m,y_m,z_m,qx,qy,qz,qw\n";
+distance_m,similarity,yaw_rad,graph_fitness,looks_fitness,overlap,inlier_share,residual_m,seen_through,\
+open,chi2,agreeing,x_m,y_m,z_m,qx,qy,qz,qw\n";
 
 fn row(entry: &LedgerEntry, from: Option<usize>, to: Option<usize>) -> String {
     // A scan of another session has no number here; a figure that was not asked for none at all.
@@ -261,7 +261,7 @@ fn row(entry: &LedgerEntry, from: Option<usize>, to: Option<usize>) -> String {
         entry.candidate_from_node.rotation.coords,
     );
     format!(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6}\n",
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6}\n",
         index(from),
         index(to),
         entry.verdict.is_accepted(),
@@ -278,6 +278,7 @@ fn row(entry: &LedgerEntry, from: Option<usize>, to: Option<usize>) -> String {
         figure(entry.overlap),
         figure(entry.inlier_share),
         figure(entry.residual_m),
+        figure(entry.seen_through),
         entry.open,
         figure(entry.chi2),
         entry.agreeing,

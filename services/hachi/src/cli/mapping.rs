@@ -39,6 +39,9 @@ pub struct DemoArguments {
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
     pub stage: StageArgument,
+    /// Keep the map in this file, or go on with the one that is there.
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
     /// What it carries: vlp16, vlp16-dual or helios16p.
     #[arg(long, value_name = "NAME", default_value = "vlp16", value_parser = sensor)]
     pub sensor: SensorKind,

@@ -11,13 +11,14 @@ use std::time::{Duration, Instant};
 use hachi_bridge::message::Sensor;
 use hachi_runtime::executor::virtual_time::VirtualTime;
 use hachi_runtime::{Health, Overrun, TaskClock, TaskSpec, Trigger, VirtualClock};
-use hachi_slam::{MemoryStore, Slam};
+use hachi_slam::Slam;
 use hachi_trajectory::Trajectory;
 use hachi_unitree::device::{HighClient, MemoryLink, SimulatedRobotConfig, SimulatedService};
 use hachi_world::{LiveLidar, SensorKind, SimulationConfig};
 
 use super::Walked;
 use crate::cli::mapping::DemoArguments;
+use crate::commands::replay::slam;
 use crate::commands::simulate::platform_of;
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
@@ -80,7 +81,9 @@ pub fn walk(
     settings.patrol.speed_m_per_s = speed.min(settings.safety.forward_m_per_s);
 
     let clock = VirtualClock::starting_at(world.start);
-    let (service, truth) = connect(&settings, &platform, &world, &clock)?;
+    let map = arguments.map.as_deref();
+    let slam = slam(map, Some(&arguments.platform), &settings.mapping())?;
+    let (service, truth) = connect(&settings, &platform, &world, &clock, slam)?;
     let Service {
         table,
         signs,
@@ -147,6 +150,7 @@ fn connect(
     platform: &Platform,
     world: &SimulationConfig,
     clock: &VirtualClock,
+    slam: Slam,
 ) -> Result<(Service, Truth), Failure> {
     let link = MemoryLink::new(clock.clone());
     let packets = MemoryPackets::default();
@@ -163,7 +167,6 @@ fn connect(
             _ => Sensor::Velodyne,
         },
     };
-    let slam = Slam::new(settings.slam.clone(), Box::new(MemoryStore::default()));
     let tasks = TaskClock::new(clock.clone());
     let mut service = assemble(settings, devices, slam, tasks, Running::VirtualTime)?;
     let body = WalkingBody::standing(platform, world);

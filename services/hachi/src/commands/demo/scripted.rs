@@ -1,13 +1,12 @@
 //! A simulated robot that follows a fixed walk: the pipeline alone, without a service.
 
 use hachi_bridge::message::Sensor;
-use hachi_slam::{MemoryStore, Slam};
 use hachi_trajectory::Trajectory;
 use hachi_world::{SensorKind, SimulatedLidar, Simulation, SimulationConfig};
 
 use super::{SCANS_PER_SECOND, Walked};
 use crate::cli::mapping::{DemoArguments, StageArgument};
-use crate::commands::replay::thread_pool;
+use crate::commands::replay::{slam, thread_pool};
 use crate::config::MappingConfig;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
@@ -40,11 +39,13 @@ pub fn walk(
     };
     let lidar = SimulatedLidar::new(Simulation::new(world.clone()));
     let mut source = from_packets(driver, lidar, |_| Vec::new());
-    let slam_config = config.slam.clone();
+    let slam = match arguments.stage {
+        StageArgument::Odometry => None,
+        StageArgument::Slam => Some(slam(arguments.map.as_deref(), None, &config)?),
+    };
     let mut mapping = Mapping::new(config, results.folder())?;
-    if arguments.stage == StageArgument::Slam {
-        let store = Box::new(MemoryStore::default());
-        mapping = mapping.with_slam(Slam::new(slam_config, store));
+    if let Some(slam) = slam {
+        mapping = mapping.with_slam(slam);
     }
     let (ended, finished, mut report) = thread_pool(None)?.install(|| {
         let mut motion = MotionSamples::default();
