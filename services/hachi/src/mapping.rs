@@ -203,6 +203,11 @@ impl Mapping {
         &self.map
     }
 
+    /// The map, of a run that is over.
+    pub fn into_map(self) -> MapBuilder {
+        self.map
+    }
+
     /// The points of the last scan that the filters left.
     pub fn kept(&self) -> &[Point] {
         &self.kept

@@ -18,17 +18,16 @@ use hachi_hal::Stamp;
 use hachi_runtime::executor::threads::{self, ThreadsConfig};
 use hachi_runtime::notify::Notifier;
 use hachi_runtime::{Health, SoftWatchdog, TaskClock, Telemetry, Trouble};
-use hachi_slam::{MemoryStore, Slam};
 use hachi_unitree::command::CommanderConfig;
 use hachi_unitree::device::{HighClient, StopLine};
 use tracing::{error, info, warn};
 
+use super::replay::slam;
 use super::simulate::platform_of;
 use crate::cli::service::RunArguments;
 use crate::config::Settings;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
-use crate::saved_maps;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
 use crate::service::web::{self, Page};
@@ -59,7 +58,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let listen = settings.service.listen;
     let listener = web::listen(listen)
         .map_err(|error| unopened(&format!("http at {listen}"), &error, "service.listen"))?;
-    let slam = slam(&settings, platform.robot.name())?;
+    let map = settings.service.map.as_deref();
+    let slam = slam(map, settings.robot.platform.as_deref(), &settings.mapping())?;
     let running = Running::Threads(settings.service.threads);
     let service = assemble(&settings, devices, slam, TaskClock::new(clock), running)?;
     info!(
@@ -198,19 +198,6 @@ fn udp_of(settings: &Settings) -> UdpConfig {
         source_address: settings.lidar.source_address,
         ..UdpConfig::on_ports(&settings.lidar.ports())
     }
-}
-
-/// SLAM on the map that the settings name: begun there, or gone on with.
-fn slam(settings: &Settings, platform: &str) -> Result<Slam, Failure> {
-    let Some(path) = &settings.service.map else {
-        return Ok(Slam::new(
-            settings.slam.clone(),
-            Box::new(MemoryStore::default()),
-        ));
-    };
-    let (file, saved) = saved_maps::go_on(path, Some(platform))?;
-    Slam::resume(settings.slam.clone(), saved, Box::new(file))
-        .map_err(|error| Failure::new(error, "restore the map from a copy, or map anew"))
 }
 
 /// A robot that nobody talks to any more is told so, some times: datagrams get lost.

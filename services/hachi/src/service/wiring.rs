@@ -16,7 +16,7 @@ use hachi_cloud::Filters;
 use hachi_hal::{LidarScans, PacketSource, Pose, Rotation};
 use hachi_odometry::Odometry;
 use hachi_robosense::{RobosenseConfig, RobosenseScans};
-use hachi_runtime::{SoftWatchdog, TaskClock, TaskTable, WhenFull, Work, bounded};
+use hachi_runtime::{Histogram, SoftWatchdog, TaskClock, TaskTable, WhenFull, Work, bounded};
 use hachi_slam::Slam;
 use hachi_unitree::LegTracker;
 use hachi_unitree::device::{HighClient, RobotLink};
@@ -97,6 +97,8 @@ pub struct Service {
     pub slam: Arc<Mutex<SlamStage>>,
     /// Bites when the base command task hangs.
     pub watchdog: SoftWatchdog,
+    /// How long a scan takes through filter, odometry and SLAM.
+    pub scan_times: Arc<Histogram>,
 }
 
 /// Puts the tasks together.
@@ -251,6 +253,7 @@ where
     );
 
     let spec = row(settings, rows::SLAM);
+    let scan_times = table.latency("filter to map");
     let gauges = vec![placed_end.full.gauge()];
     let task = SlamTask {
         stage: Arc::clone(&slam),
@@ -260,6 +263,7 @@ where
         crew: running.crew(spec.priority),
         level: 0,
         count: 0,
+        scan_times: Arc::clone(&scan_times),
     };
     table.add(spec, to_slam, gauges, Box::new(task));
     Ok(Service {
@@ -268,6 +272,7 @@ where
         record,
         slam,
         watchdog,
+        scan_times,
     })
 }
 
