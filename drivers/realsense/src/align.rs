@@ -165,26 +165,21 @@ impl<'a> Seen<'a> {
     /// rectified; others' lenses cost time.
     #[inline]
     fn pin_hole(&self, first: [f32; 2]) -> [[f32; LANES]; 2] {
-        let mut looks = [[0.0; LANES]; 2];
+        let columns: [f32; LANES] = core::array::from_fn(|lane| first[0] + lane as f32);
         match self.depth.distortion {
             Distortion::None => {
                 let y = (first[1] - self.depth_centre[1]) * self.per_focal[1];
-                for lane in 0..LANES {
-                    let column = first[0] + lane as f32;
-                    looks[0][lane] = (column - self.depth_centre[0]) * self.per_focal[0];
-                    looks[1][lane] = y;
-                }
+                let x = columns.map(|column| (column - self.depth_centre[0]) * self.per_focal[0]);
+                [x, [y; LANES]]
             }
             _ => {
-                for lane in 0..LANES {
-                    let pixel = [first[0] + lane as f32, first[1]].map(f64::from);
-                    let point = self.depth.deproject(pixel, 1.0);
-                    looks[0][lane] = point.x as f32;
-                    looks[1][lane] = point.y as f32;
-                }
+                let looks = columns.map(|column| {
+                    let pixel = [column, first[1]].map(f64::from);
+                    self.depth.deproject(pixel, 1.0)
+                });
+                [looks.map(|p| p.x as f32), looks.map(|p| p.y as f32)]
             }
         }
-        looks
     }
 }
 
