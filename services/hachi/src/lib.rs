@@ -11,7 +11,7 @@
 //! | [`report`], [`latency`] | `report.json`, and the times that go into it |
 //! | [`log`] | logging |
 //! | [`mapping`] | the flow from scans to trajectory and map: read it first |
-//! | [`recording`], [`motion_samples`] | recordings of any kind as scans and samples |
+//! | [`recording`], [`motion_samples`], [`leg_samples`] | recordings of any kind as scans and samples |
 //! | [`recorder`] | what sensors sent, as a file |
 //! | [`record`] | what a run has done so far |
 //! | [`service`] | the service on a robot, task by task |
@@ -30,6 +30,7 @@ pub mod config;
 pub mod exit;
 pub mod interrupt;
 pub mod latency;
+pub mod leg_samples;
 pub mod log;
 pub mod map_builder;
 pub mod map_picture;
