@@ -1,7 +1,7 @@
 //! Writes what sensors sent as an MCAP file that Foxglove and ROS 2 tools open.
 //!
 //! In: the LiDAR's packets and the robot's body, with their stamps. Out: one file; its topics are in
-//! [`schemas`], their bytes in [`cdr`]. Packets are kept as they came, so that `hachi replay` of the
+//! `schemas`, their bytes in `cdr`. Packets are kept as they came, so that `hachi replay` of the
 //! file is what a replay of the wire would have been. What is in a finished chunk (a quarter of a
 //! megabyte, a fifth of a second) survives a power cut.
 
