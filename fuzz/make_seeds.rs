@@ -13,6 +13,8 @@ use hachi_realsense::encode as d400;
 use hachi_realsense::frame as d400_frame;
 use hachi_robosense::encode as helios;
 use hachi_robosense::packet as helios_packet;
+use hachi_robotiq::frame as robotiq_frame;
+use hachi_robotiq::serve as robotiq_serve;
 use hachi_slam::codec::encode;
 use hachi_slam::node::Ground;
 use hachi_slam::submap::{Submap, SubmapBuilder};
@@ -196,6 +198,74 @@ fn realsense() -> Vec<Vec<u8>> {
     inputs.chain([streamed]).collect()
 }
 
+/// A request and an answer of a gripper; and the answers to two writes and two reads in pieces.
+fn robotiq() -> Vec<Vec<u8>> {
+    let command = robotiq_frame::Command {
+        activate: true,
+        go: true,
+        position: 255,
+        ..robotiq_frame::Command::default()
+    };
+    let state = robotiq_frame::State {
+        activate: true,
+        activation: robotiq_frame::Activation::Done,
+        ..robotiq_frame::State::default()
+    };
+    let written = robotiq_serve::Asked::Write {
+        command,
+        registers: 3,
+    };
+    let read = robotiq_serve::Asked::Read {
+        function: 3,
+        registers: 3,
+    };
+    let [written, read] = [written, read].map(|a| robotiq_serve::answer(9, a, &state).to_vec());
+    let pieces = |frame: &[u8]| [vec![frame.len() as u8], frame.to_vec()].concat();
+    let conversation = [&written, &written, &read, &read, &written].map(|f| pieces(f));
+    vec![
+        robotiq_frame::Request::Write(command).encode(9).to_vec(),
+        robotiq_frame::Request::Read.encode(9).to_vec(),
+        written.clone(),
+        read.clone(),
+        [vec![0x80], conversation.concat()].concat(),
+    ]
+}
+
+/// A stop's node that starts, closes its contacts, is pressed and falls silent; an axis's messages.
+fn canbus() -> Vec<Vec<u8>> {
+    let frame = |id: u16, ticks: u8, bytes: &[u8]| {
+        let [high, low] = id.to_be_bytes();
+        [&[high, low, bytes.len() as u8, ticks], bytes].concat()
+    };
+    let stop = [
+        frame(0x701, 0, &[0]),
+        frame(0x701, 50, &[5]),
+        frame(0x181, 1, &[3]),
+        frame(0x701, 50, &[5]),
+        frame(0x181, 10, &[0]),
+        frame(0x081, 1, &[0x20, 0x81]),
+        frame(0x7E8, 255, &[]),
+    ];
+    let axis = [
+        frame(0x021, 0, &[0, 0, 0, 0, 8, 0, 0, 0x80]),
+        frame(0x029, 1, &[0, 0, 0x80, 0x3F, 0, 0, 0, 0xC0]),
+        frame(0x037, 1, &[0, 0, 0xC0, 0x41, 0, 0, 0, 0x3F]),
+    ];
+    vec![stop.concat(), axis.concat()]
+}
+
+/// A measurement; and reads of a chip that is not ready, ready with a measurement, and failing.
+fn imu() -> Vec<Vec<u8>> {
+    let at_rest = vec![0, 0, 0, 0, 0, 0, 0x10, 0, 0, 0, 0, 0, 0, 164];
+    let reads = [
+        vec![0, 0, 0, 0, 0, 8, 0],
+        at_rest.clone(),
+        vec![0xFF, 0, 8, 0],
+        at_rest.clone(),
+    ];
+    vec![at_rest, reads.concat()]
+}
+
 /// Numbers of a walk: bytes around the middle stand for joints near zero.
 fn leg_numbers() -> Vec<u8> {
     (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
@@ -287,8 +357,11 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 16] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 19] = [
+        ("canbus", canbus()),
+        ("imu", imu()),
         ("realsense", realsense()),
+        ("robotiq", robotiq()),
         (
             "velodyne_packet",
             vec![

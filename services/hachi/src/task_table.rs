@@ -4,6 +4,14 @@ use std::fmt::Write;
 
 use crate::service::web::Status;
 
+/// To the upper left, and everything below it gone.
+const CLEAR: &str = "\x1b[H\x1b[J";
+
+/// The table in place of what is on the screen.
+pub fn on_screen(status: &Status) -> String {
+    format!("{CLEAR}{}", text(status))
+}
+
 /// The table with what stands above and below it.
 pub fn text(status: &Status) -> String {
     let mut out = String::new();

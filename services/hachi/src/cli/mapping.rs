@@ -15,10 +15,10 @@ Writes map.ply, trajectory.svg, trajectory.tum, odometry.tum and report.json to 
 Example:
   hachi demo --seconds 30 --out out/demo")]
 pub struct DemoArguments {
-    /// How long the robot walks, seconds of its own time.
+    /// How long the robot walks, seconds of its own time: the clock is virtual.
     #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = super::seconds)]
     pub seconds: f64,
-    /// Open no window and no address: only write files and the summary.
+    /// Show no task table: only write files and the summary.
     #[arg(long)]
     pub headless: bool,
     /// The building, the walk and the noise: the same number gives the same bytes.
@@ -29,6 +29,17 @@ pub struct DemoArguments {
     /// on rolling ground, 2.5 km in 21 minutes) or campus-long (20 km at 4 m/s).
     #[arg(long, value_name = "NAME", default_value = "office", value_parser = world)]
     pub world: Preset,
+    /// The robot that the service drives: b1 or go1.
+    #[arg(long, value_name = "NAME", default_value = "b1")]
+    pub platform: String,
+    /// The robot follows a fixed walk and nobody drives it; always so in the worlds stress and
+    /// campus-long, and with --stage odometry.
+    #[arg(long)]
+    pub scripted: bool,
+    /// Keep what LiDAR and legs sent in this MCAP file, for `hachi replay`, Foxglove and ROS 2; of a
+    /// robot that the service drives.
+    #[arg(long, value_name = "FILE", conflicts_with = "scripted")]
+    pub record: Option<PathBuf>,
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
     pub stage: StageArgument,

@@ -15,8 +15,6 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const REFRESH_TENTHS: u32 = 10;
 /// An answer is never longer: a table of 16 tasks has 10 kB.
 const MOST_BYTES: u64 = 1 << 20;
-/// To the upper left, and everything below it gone.
-const CLEAR: &str = "\x1b[H\x1b[J";
 
 /// Runs the command.
 ///
@@ -33,7 +31,7 @@ pub fn run(arguments: &TopArguments) -> Result<(), Failure> {
     let cancelled = Cancelled::on_interrupt()?;
     while !cancelled.is_cancelled() {
         let status = ask(arguments.address)?;
-        output::text(&format!("{CLEAR}{}", task_table::text(&status)))?;
+        output::text(&task_table::on_screen(&status))?;
         for _ in 0..REFRESH_TENTHS {
             if cancelled.is_cancelled() {
                 break;

@@ -1,5 +1,7 @@
 //! `filter`: what stands around, for the gate; then which points odometry works with.
 
+use std::time::Instant;
+
 use hachi_behaviour::{ObstacleFinder, Obstacles};
 use hachi_cloud::{Filters, ScanFrames};
 use hachi_hal::{Pose, Stamp};
@@ -43,6 +45,7 @@ pub struct Filter {
 impl Work for Filter {
     fn run(&mut self, _: Stamp) -> Progress {
         self.crew.assemble();
+        let begun = Some(Instant::now());
         let Some(mut scan) = self.scans.full.receive() else {
             return Progress::Done;
         };
@@ -65,7 +68,7 @@ impl Work for Filter {
                 footprint_from_lidar: felt,
             };
             let filtered = self.filters.step(&scan.points, &frames, &mut kept.points);
-            (kept.header, kept.filtered) = (scan.header, Some(filtered));
+            (kept.header, kept.filtered, kept.begun) = (scan.header, Some(filtered), begun);
             self.out.send(kept);
         }
         self.scans.give_back(scan);

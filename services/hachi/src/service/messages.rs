@@ -1,6 +1,8 @@
 //! What passes from task to task. Large things are boxes that go round: whoever empties one sends
 //! it back, so that nothing is allocated once all are under way.
 
+use std::time::Instant;
+
 use hachi_cloud::Filtered;
 use hachi_hal::{Point, Pose, ScanHeader};
 use hachi_odometry::Estimate;
@@ -29,6 +31,8 @@ pub struct Kept {
     pub scanned: usize,
     /// What went, and why.
     pub filtered: Option<Filtered>,
+    /// When work on the scan began.
+    pub begun: Option<Instant>,
 }
 
 /// A scan that odometry placed.
@@ -40,6 +44,8 @@ pub struct Placed {
     pub odom_from_base: Pose,
     /// The points that stayed, base frame, as if taken at the scan's end.
     pub points: Vec<Point>,
+    /// When work on the scan began.
+    pub begun: Option<Instant>,
 }
 
 /// How the odometry's frame lies on the map, and whether to be trusted.

@@ -119,6 +119,7 @@ impl OdometryTask {
                 &mut placed.points,
             );
             (placed.estimate, placed.odom_from_base) = (Some(estimate), odom_from_base);
+            placed.begun = kept.begun;
             self.out.send(placed);
         }
     }

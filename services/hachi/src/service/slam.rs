@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use hachi_hal::Stamp;
-use hachi_runtime::{Progress, Sender, Work};
+use hachi_runtime::{Histogram, Progress, Sender, Work};
 use hachi_slam::SlamCondition;
 
 use super::crew::Crew;
@@ -31,6 +31,8 @@ pub struct SlamTask {
     pub level: usize,
     /// Scans so far.
     pub count: u64,
+    /// From the beginning of the work on a scan to its end here.
+    pub scan_times: Arc<Histogram>,
 }
 
 impl Work for SlamTask {
@@ -60,6 +62,9 @@ impl Work for SlamTask {
                 map_from_odom: place.map_from_odom,
                 trusted: !matches!(place.condition, SlamCondition::Lost(_)),
             });
+        }
+        if let Some(begun) = placed.begun {
+            self.scan_times.record(begun.elapsed());
         }
         self.scans.give_back(placed);
         match self.scans.full.is_empty() {

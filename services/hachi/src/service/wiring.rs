@@ -16,7 +16,7 @@ use hachi_cloud::Filters;
 use hachi_hal::{LidarScans, PacketSource, Pose, Rotation};
 use hachi_odometry::Odometry;
 use hachi_robosense::{RobosenseConfig, RobosenseScans};
-use hachi_runtime::{SoftWatchdog, TaskClock, TaskTable, WhenFull, Work, bounded};
+use hachi_runtime::{Histogram, SoftWatchdog, TaskClock, TaskTable, WhenFull, Work, bounded};
 use hachi_slam::Slam;
 use hachi_unitree::LegTracker;
 use hachi_unitree::device::{HighClient, RobotLink};
@@ -32,14 +32,16 @@ use super::legs::Legs;
 use super::lidar::LidarReceive;
 use super::messages::{Belt, Correction, Kept, Placed, Scan, belt};
 use super::odometry::OdometryTask;
+use super::record::{Datagram, RecorderTask, Tap};
 use super::settings::{Platform, row};
 use super::signs::SharedSigns;
 use super::slam::SlamTask;
 use super::supervisor::Supervisor;
-use super::{odometry, rows};
+use super::{odometry, record, rows};
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::record::RunRecord;
+use crate::recorder::Recorder;
 use crate::slam_stage::SlamStage;
 
 /// The base command task is fed to the watchdog; after this it hangs, ns. Twenty of its runs.
@@ -97,6 +99,8 @@ pub struct Service {
     pub slam: Arc<Mutex<SlamStage>>,
     /// Bites when the base command task hangs.
     pub watchdog: SoftWatchdog,
+    /// How long a scan takes through filter, odometry and SLAM.
+    pub scan_times: Arc<Histogram>,
 }
 
 /// Puts the tasks together.
@@ -109,6 +113,7 @@ pub fn assemble<P, L>(
     slam: Slam,
     clock: TaskClock,
     running: Running,
+    recorder: Option<Recorder>,
 ) -> Result<Service, Failure>
 where
     P: PacketSource + Send + 'static,
@@ -138,6 +143,11 @@ where
     let (corrections, corrections_end) = bounded("corrections", 2, WhenFull::DropOldest, &nobody);
     let (to_gate, gate_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
     let (to_behaviour, behaviour_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
+    let (record_bodies, bodies_to_record) =
+        bounded("bodies to record", 64, WhenFull::DropOldest, &nobody);
+    let (record_packets, packets_to_record) =
+        belt::<Datagram>(&table, "packets to record", record::WAITING, &nobody);
+    let records = recorder.is_some();
     let (wishes, wishes_end) = bounded("wishes", 4, WhenFull::DropOldest, &nobody);
 
     let gauges = vec![wishes_end.gauge(), gate_places.gauge(), around_end.gauge()];
@@ -161,7 +171,11 @@ where
     let spec = row(settings, rows::BASE_COMMAND);
     table.add(spec, bell, gauges, Box::new(base_command));
 
-    let receive = lidar_receive(devices.sensor, devices.packets, scans, Arc::clone(&signs));
+    let packets = Tap {
+        source: devices.packets,
+        out: records.then_some(record_packets),
+    };
+    let receive = lidar_receive(devices.sensor, packets, scans, Arc::clone(&signs));
     let bell = table.bell();
     table.add(row(settings, rows::LIDAR_RECEIVE), bell, vec![], receive);
 
@@ -171,6 +185,7 @@ where
         bodies: bodies_end,
         motion,
         ground,
+        record: records.then_some(record_bodies),
     };
     table.add(row(settings, rows::LEGS), to_legs, gauges, Box::new(legs));
 
@@ -251,6 +266,7 @@ where
     );
 
     let spec = row(settings, rows::SLAM);
+    let scan_times = table.latency("filter to map");
     let gauges = vec![placed_end.full.gauge()];
     let task = SlamTask {
         stage: Arc::clone(&slam),
@@ -260,14 +276,29 @@ where
         crew: running.crew(spec.priority),
         level: 0,
         count: 0,
+        scan_times: Arc::clone(&scan_times),
     };
     table.add(spec, to_slam, gauges, Box::new(task));
+
+    if records {
+        let gauges = vec![packets_to_record.full.gauge(), bodies_to_record.gauge()];
+        let task = RecorderTask {
+            recorder,
+            packets: packets_to_record,
+            bodies: bodies_to_record,
+            batch: Vec::with_capacity(record::WAITING + 2),
+            signs: Arc::clone(&signs),
+        };
+        let bell = table.bell();
+        table.add(row(settings, rows::RECORDER), bell, gauges, Box::new(task));
+    }
     Ok(Service {
         table,
         signs,
         record,
         slam,
         watchdog,
+        scan_times,
     })
 }
 
