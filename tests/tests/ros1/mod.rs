@@ -10,11 +10,10 @@ pub struct Message {
     pub data: Vec<u8>,
 }
 
-/// Fields of a record's header by their names.
-type Fields = HashMap<String, Vec<u8>>;
+/// Fields of one record's header, and its data.
+type Record<'a> = (HashMap<String, Vec<u8>>, &'a [u8]);
 
-/// Fields of each record's header, and its data.
-fn records(bytes: &[u8]) -> Vec<(Fields, &[u8])> {
+fn records(bytes: &[u8]) -> Vec<Record<'_>> {
     let mut rest = bytes;
     let mut block = || {
         let (len, after) = rest.split_first_chunk::<4>()?;
@@ -29,8 +28,8 @@ fn records(bytes: &[u8]) -> Vec<(Fields, &[u8])> {
     found
 }
 
-fn fields(mut header: &[u8]) -> Fields {
-    let mut fields = Fields::new();
+fn fields(mut header: &[u8]) -> HashMap<String, Vec<u8>> {
+    let mut fields = HashMap::new();
     while let Some((len, after)) = header.split_first_chunk::<4>() {
         let (field, after) = after.split_at(u32::from_le_bytes(*len) as usize);
         let equals = field.iter().position(|&b| b == b'=').unwrap();
