@@ -208,7 +208,7 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 13] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 14] = [
         ("realsense", realsense()),
         (
             "velodyne_packet",
@@ -254,6 +254,12 @@ fn main() -> Result<()> {
             ],
         ),
         ("leg_tracker", vec![leg_numbers()]),
+        (
+            "detector_outputs",
+            (0..4)
+                .map(|kind| with_switches(kind, leg_numbers()))
+                .collect(),
+        ),
         (
             "mot_text",
             vec![

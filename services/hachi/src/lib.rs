@@ -14,6 +14,8 @@
 //! | [`recording`], [`motion_samples`] | recordings of any kind as scans and samples |
 //! | [`config`] | settings |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
+//! | [`images`] | folders of images |
+//! | [`networks`] | which networks find people and tell them apart |
 //! | [`mot_files`] | files of boxes and tracks |
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
@@ -24,6 +26,7 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod exit;
+pub mod images;
 pub mod interrupt;
 pub mod latency;
 pub mod log;
@@ -32,6 +35,7 @@ pub mod map_picture;
 pub mod mapping;
 pub mod mot_files;
 pub mod motion_samples;
+pub mod networks;
 pub mod output;
 pub mod precision_recall_picture;
 pub mod progress;
