@@ -36,11 +36,20 @@ def read_ply(path):
     return np.frombuffer(body, np.dtype(fields), count)
 
 
+def correct_kitti(points):
+    from kiss_icp.pybind import kiss_icp_pybind as kiss
+
+    return np.asarray(kiss._correct_kitti_scan(kiss._Vector3dVector(points)))
+
+
 def scans(path, scratch, stamps):
     """(points n x 3, relative times or None) for each scan."""
     if os.path.isdir(path):
-        for f in sorted(glob.glob(path + "/*.bin")):
-            yield np.fromfile(f, "<f4").reshape(-1, 4)[:, :3].astype(float), None
+        # A KITTI sequence: `hachi` corrects the LiDAR's vertical angles, and so do KISS-ICP's own tools.
+        is_sequence = os.path.exists(path + "/calib.txt")
+        for f in sorted(glob.glob(path + ("/velodyne/*.bin" if is_sequence else "/*.bin"))):
+            points = np.fromfile(f, "<f4").reshape(-1, 4)[:, :3].astype(float)
+            yield correct_kitti(points) if is_sequence else points, None
         return
     hachi("decode", path, "--out", scratch, "--format", "ply")
     for f in sorted(glob.glob(scratch + "/*.ply"))[: len(stamps)]:

@@ -5,12 +5,21 @@
 use std::fs;
 use std::io::Result;
 use std::path::Path;
+use std::sync::Arc;
 
-use hachi_hal::{Distortion, Intrinsics, Pose};
+use hachi_hal::{Distortion, Intrinsics, Pose, Stamp};
+use hachi_place::{Database, Describer, DescriberConfig, Descriptor, Profile};
 use hachi_realsense::encode as d400;
 use hachi_realsense::frame as d400_frame;
 use hachi_robosense::encode as helios;
 use hachi_robosense::packet as helios_packet;
+use hachi_robotiq::frame as robotiq_frame;
+use hachi_robotiq::serve as robotiq_serve;
+use hachi_slam::codec::encode;
+use hachi_slam::node::Ground;
+use hachi_slam::submap::{Submap, SubmapBuilder};
+use hachi_slam::{Map, Node, NodeId};
+use hachi_store::{Identity, MapFile};
 use hachi_unitree::frame as unitree;
 use hachi_velodyne::encode as vlp16;
 use hachi_velodyne::packet as vlp16_packet;
@@ -189,9 +198,149 @@ fn realsense() -> Vec<Vec<u8>> {
     inputs.chain([streamed]).collect()
 }
 
+/// A request and an answer of a gripper; and the answers to two writes and two reads in pieces.
+fn robotiq() -> Vec<Vec<u8>> {
+    let command = robotiq_frame::Command {
+        activate: true,
+        go: true,
+        position: 255,
+        ..robotiq_frame::Command::default()
+    };
+    let state = robotiq_frame::State {
+        activate: true,
+        activation: robotiq_frame::Activation::Done,
+        ..robotiq_frame::State::default()
+    };
+    let written = robotiq_serve::Asked::Write {
+        command,
+        registers: 3,
+    };
+    let read = robotiq_serve::Asked::Read {
+        function: 3,
+        registers: 3,
+    };
+    let [written, read] = [written, read].map(|a| robotiq_serve::answer(9, a, &state).to_vec());
+    let pieces = |frame: &[u8]| [vec![frame.len() as u8], frame.to_vec()].concat();
+    let conversation = [&written, &written, &read, &read, &written].map(|f| pieces(f));
+    vec![
+        robotiq_frame::Request::Write(command).encode(9).to_vec(),
+        robotiq_frame::Request::Read.encode(9).to_vec(),
+        written.clone(),
+        read.clone(),
+        [vec![0x80], conversation.concat()].concat(),
+    ]
+}
+
+/// A stop's node that starts, closes its contacts, is pressed and falls silent; an axis's messages.
+fn canbus() -> Vec<Vec<u8>> {
+    let frame = |id: u16, ticks: u8, bytes: &[u8]| {
+        let [high, low] = id.to_be_bytes();
+        [&[high, low, bytes.len() as u8, ticks], bytes].concat()
+    };
+    let stop = [
+        frame(0x701, 0, &[0]),
+        frame(0x701, 50, &[5]),
+        frame(0x181, 1, &[3]),
+        frame(0x701, 50, &[5]),
+        frame(0x181, 10, &[0]),
+        frame(0x081, 1, &[0x20, 0x81]),
+        frame(0x7E8, 255, &[]),
+    ];
+    let axis = [
+        frame(0x021, 0, &[0, 0, 0, 0, 8, 0, 0, 0x80]),
+        frame(0x029, 1, &[0, 0, 0x80, 0x3F, 0, 0, 0, 0xC0]),
+        frame(0x037, 1, &[0, 0, 0xC0, 0x41, 0, 0, 0, 0x3F]),
+    ];
+    vec![stop.concat(), axis.concat()]
+}
+
+/// A measurement; and reads of a chip that is not ready, ready with a measurement, and failing.
+fn imu() -> Vec<Vec<u8>> {
+    let at_rest = vec![0, 0, 0, 0, 0, 0, 0x10, 0, 0, 0, 0, 0, 0, 164];
+    let reads = [
+        vec![0, 0, 0, 0, 0, 8, 0],
+        at_rest.clone(),
+        vec![0xFF, 0, 8, 0],
+        at_rest.clone(),
+    ];
+    vec![at_rest, reads.concat()]
+}
+
 /// Numbers of a walk: bytes around the middle stand for joints near zero.
 fn leg_numbers() -> Vec<u8> {
     (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
+}
+
+/// A floor and a wall as a submap.
+fn corner() -> Submap {
+    let mut builder = SubmapBuilder::default();
+    let points = (0..400).flat_map(|i| {
+        let (a, b) = ((i % 20) as f32 * 0.2 - 2.0, (i / 20) as f32 * 0.2 - 2.0);
+        [([a, b, -0.5], 40.0), ([2.0, a, 0.5 * (b + 1.0)], 90.0)]
+    });
+    builder.add([0.0; 3], points);
+    let mut submap = Submap::default();
+    builder.finish(&mut submap);
+    submap
+}
+
+fn submap_bytes() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    encode(&corner(), &mut bytes);
+    bytes
+}
+
+/// The corner as a place, and a data base of it seen from three headings.
+fn places() -> [Vec<u8>; 2] {
+    let mut describer = Describer::new(Profile::INDOOR, DescriberConfig::default());
+    let (mut database, mut place) = (Database::default(), Descriptor::default());
+    for turn in 0..3 {
+        let (sin, cos) = (turn as f32).sin_cos();
+        let cloud: Vec<[f32; 4]> = corner()
+            .points
+            .iter()
+            .map(|p| {
+                let [x, y, z] = p.position;
+                [cos * x - sin * y, sin * x + cos * y, z + 0.5, 40.0]
+            })
+            .collect();
+        describer.describe(&cloud, &mut place);
+        database.insert(turn, &place).expect("one layout");
+    }
+    [place.to_bytes(), database.to_bytes()]
+}
+
+/// A map of two nodes that hang on each other by nothing.
+fn map_file() -> Result<Vec<u8>> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("seed.map");
+    let identity = Identity {
+        platform: "go1".to_owned(),
+        sensor: "VLP-16".to_owned(),
+    };
+    let file = MapFile::create(&path, &identity).expect("a new file");
+    let mut map = Map::new(Box::new(file), 1 << 20);
+    for id in 0..2 {
+        let pose = Pose::translation(f64::from(id), 0.0, 0.0);
+        let ground = Ground::level(0.5);
+        let node = Node {
+            id: NodeId(id),
+            session: id,
+            piece: map.begin_piece(),
+            chained: false,
+            stamp: Stamp::from_nanos(1_700_000_000_000_000_000),
+            odom_from_node: pose,
+            map_from_node: pose,
+            path_m: 0.0,
+            ground,
+        };
+        map.places.describe(&corner(), &ground);
+        map.add_node(node, Arc::new(corner()), None)
+            .expect("a piece of its own");
+    }
+    map.commit(true).expect("room for a temporary file");
+    drop(map);
+    fs::read(&path)
 }
 
 fn with_switches(switches: u8, payload: Vec<u8>) -> Vec<u8> {
@@ -208,8 +357,11 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 14] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 20] = [
+        ("canbus", canbus()),
+        ("imu", imu()),
         ("realsense", realsense()),
+        ("robotiq", robotiq()),
         (
             "velodyne_packet",
             vec![
@@ -254,6 +406,9 @@ fn main() -> Result<()> {
             ],
         ),
         ("leg_tracker", vec![leg_numbers()]),
+        ("submap", vec![submap_bytes()]),
+        ("place_database", places().to_vec()),
+        ("map_file", vec![map_file()?]),
         (
             "detector_outputs",
             (0..4)

@@ -5,15 +5,17 @@
 //! the checks themselves hold no memory but the caller's.
 //!
 //! The promises are those written beside the traits: sensors' here, in the order of
-//! [`crate::device`], cameras' in `camera`, a robot's body in `robot`. [`ScanPromise`] and
+//! [`crate::device`], cameras' in `camera`, grippers' in `gripper`, a robot's body in `robot`. [`ScanPromise`] and
 //! [`SamplePromise`] can also be fed by hand, next to other work on the same stream.
 
 mod camera;
+mod gripper;
 mod robot;
 
 use core::fmt;
 
 pub use camera::{FramePromise, check_rgbd_camera};
+pub use gripper::{GripperViolation, check_gripper};
 pub use robot::{
     BaseViolation, LegViolation, check_base_drive, check_battery, check_emergency_stop,
     check_leg_kinematics, check_legs,

@@ -16,6 +16,7 @@
 //! | [`imu`], [`motion`] | inertial samples, external odometry |
 //! | [`legs`] | joints and feet of a quadruped; [`LegKinematics`] |
 //! | [`base`] | commands to a base, which die of age; [`BaseDrive`] |
+//! | [`gripper`] | two fingers: [`Gripper`] |
 //! | [`power`], [`safety`] | battery, emergency stop, watchdog |
 //! | [`device`] | the device traits and [`FaultKind`] |
 //! | `mock`, `conformance` | scripted devices; each trait's promise as a check (features) |
@@ -29,6 +30,7 @@ pub mod base;
 pub mod camera;
 pub mod device;
 pub mod geometry;
+pub mod gripper;
 pub mod imu;
 pub mod legs;
 pub mod motion;
@@ -49,6 +51,7 @@ pub use base::{
 pub use camera::{Distortion, Intrinsics, RgbdCamera, RgbdGeometry, RgbdHeader, RgbdImages};
 pub use device::{Clock, DeviceError, FaultKind, Imu, LidarScans, PacketSource, Received};
 pub use geometry::{Pose, Rotation, Vector3};
+pub use gripper::{Grip, Gripper, GripperCommand, GripperSample};
 pub use imu::ImuSample;
 pub use legs::{AttitudeSample, Leg, LegKinematics, LegPosture, LegState, LegStates, Matrix3};
 pub use motion::OdometrySample;

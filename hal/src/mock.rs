@@ -19,6 +19,7 @@
 //! ```
 
 mod camera;
+mod gripper;
 mod robot;
 
 use core::fmt;
@@ -30,6 +31,7 @@ use crate::{
 };
 
 pub use camera::{MockCamera, Shot};
+pub use gripper::{MockGripper, MockGripperError};
 pub use robot::{MockBase, MockBattery, MockEmergencyStop, MockLegs, MockWatchdog};
 
 /// What a scripted device does on one call.

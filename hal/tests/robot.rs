@@ -5,12 +5,16 @@
 use std::cell::Cell;
 
 use hachi_hal::conformance::{
-    BaseViolation, Violation, check_base_drive, check_battery, check_emergency_stop, check_legs,
+    BaseViolation, GripperViolation, Violation, check_base_drive, check_battery,
+    check_emergency_stop, check_gripper, check_legs,
 };
-use hachi_hal::mock::{MockBase, MockBattery, MockEmergencyStop, MockLegs, MockWatchdog, Step};
+use hachi_hal::mock::{
+    MockBase, MockBattery, MockEmergencyStop, MockGripper, MockGripperError, MockLegs,
+    MockWatchdog, Step,
+};
 use hachi_hal::{
     BaseAction, BaseCommand, BaseDrive, BaseStatus, BatterySample, BodyVelocity, Clock, FaultKind,
-    LegState, Stamp, StopSample, Vector3, Watchdog,
+    Gripper, GripperCommand, GripperSample, LegState, Stamp, StopSample, Vector3, Watchdog,
 };
 
 struct Ticking(Cell<i64>);
@@ -152,4 +156,66 @@ fn a_watchdog_bites_only_after_its_time_without_food() {
     assert!(!dog.bites(Stamp::from_nanos(1_100)));
     assert!(dog.bites(Stamp::from_nanos(1_101)));
     assert_eq!(dog.timeout_ns(), 100);
+}
+
+#[test]
+fn a_gripper_that_keeps_its_promise_passes() {
+    check_gripper(&mut MockGripper::around(0.0), &clock(), 3, 1_000).unwrap();
+}
+
+/// A gripper that is at fault in one way.
+struct Faulty {
+    inner: MockGripper,
+    takes_anything: bool,
+    opening_m: Option<f64>,
+}
+
+impl Gripper for Faulty {
+    type Error = MockGripperError;
+    fn stroke_m(&self) -> f64 {
+        self.inner.stroke_m()
+    }
+    fn activate(&mut self) -> Result<(), MockGripperError> {
+        self.inner.activate()
+    }
+    fn command(&mut self, command: &GripperCommand) -> Result<(), MockGripperError> {
+        match self.inner.command(command) {
+            Err(MockGripperError::NotFinite) if self.takes_anything => Ok(()),
+            answer => answer,
+        }
+    }
+    fn stop(&mut self) -> Result<(), MockGripperError> {
+        self.inner.stop()
+    }
+    fn read_gripper(&mut self, by: Stamp) -> Result<Option<GripperSample>, MockGripperError> {
+        let sample = self.inner.read_gripper(by)?;
+        Ok(sample.map(|sample| GripperSample {
+            opening_m: self.opening_m.unwrap_or(sample.opening_m),
+            ..sample
+        }))
+    }
+}
+
+#[test]
+fn broken_promises_of_grippers_are_named() {
+    let check = |takes_anything, opening_m, object_m| {
+        let mut gripper = Faulty {
+            inner: MockGripper::around(object_m),
+            takes_anything,
+            opening_m,
+        };
+        check_gripper(&mut gripper, &clock(), 3, 1_000).unwrap_err()
+    };
+    let took = check(true, None, 0.0);
+    assert!(matches!(took, GripperViolation::TookBad(_)), "{took}");
+    let outside = check(false, Some(0.1), 0.0);
+    assert!(matches!(outside, GripperViolation::Opening(_)), "{outside}");
+    let stuck = check(false, Some(0.04), 0.0);
+    assert!(
+        matches!(stuck, GripperViolation::Elsewhere { .. }),
+        "{stuck}"
+    );
+    // It is not empty, as it must be for this check.
+    let held = check(false, None, 0.02);
+    assert!(matches!(held, GripperViolation::Elsewhere { .. }), "{held}");
 }

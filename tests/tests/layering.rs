@@ -58,6 +58,24 @@ const LAYERS: &[Layer] = &[
                   is moved onto the robot's as a LiDAR's is",
     },
     Layer {
+        name: "hachi-robotiq",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "a driver knows its device: no other maker, no robot, no service",
+    },
+    Layer {
+        name: "hachi-canbus",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "a driver knows its device: no other maker, no robot, no service",
+    },
+    Layer {
+        name: "hachi-imu",
+        sees: &["hachi-hal"],
+        tests_see: &[],
+        because: "a driver knows its device: no other maker, no robot, no service",
+    },
+    Layer {
         name: "hachi-unitree",
         sees: &["hachi-hal", "hachi-datagram"],
         tests_see: &["hachi-b1", "hachi-go1"],

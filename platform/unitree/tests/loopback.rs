@@ -354,3 +354,43 @@ fn samples_that_nobody_fetches_make_room_and_are_counted() {
     }
     assert!((64..80).contains(&fetched), "{fetched}");
 }
+
+/// A Go1 sends ten frames for each new one. A host that looks now and then and does not wait must
+/// have the newest after one look.
+#[test]
+fn a_host_that_does_not_wait_is_not_left_behind_by_repeated_frames() {
+    use hachi_unitree::device::{MemoryLink, SimulatedService};
+    use std::cell::Cell;
+
+    #[derive(Clone)]
+    struct Hand(std::rc::Rc<Cell<i64>>);
+    impl Clock for Hand {
+        fn now(&self) -> Stamp {
+            Stamp::from_nanos(self.0.get())
+        }
+    }
+    let hand = Hand(std::rc::Rc::default());
+    let link = MemoryLink::new(hand.clone());
+    let config = ClientConfig::for_robot(&GO1);
+    let mut client = HighClient::over(&GO1, config, link.clone()).unwrap();
+    let body = KinematicBody::standing(&GO1, 0.28);
+    let config = SimulatedRobotConfig::for_robot(&GO1);
+    let mut robot = SimulatedService::new(&GO1.layout, body, config);
+    for ms in 1..=1_000 {
+        hand.0.set(ms * MS);
+        while let Some(frame) = link.heard() {
+            robot.hear(&frame, hand.now());
+        }
+        if let Some(state) = robot.step(hand.now()) {
+            link.answer(state.as_bytes());
+        }
+        if ms % 10 == 0 {
+            while client.exchange(hand.now()).unwrap() {}
+        }
+    }
+    // New every 20 ms; the last look was at the last moment.
+    let (_, stamp) = client.state().unwrap();
+    assert!(hand.now().nanos_since(*stamp) <= 30 * MS, "{stamp}");
+    assert!(client.counters().states >= 45, "{:?}", client.counters());
+    assert!(matches!(client.health(hand.now()), LinkHealth::Alive));
+}

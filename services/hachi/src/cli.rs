@@ -8,6 +8,7 @@ pub mod map;
 pub mod mapping;
 pub mod model;
 pub mod people;
+pub mod service;
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -35,6 +36,12 @@ pub struct Cli {
 pub enum Command {
     /// Walk a simulated robot through a building and map it. Needs nothing plugged in.
     Demo(mapping::DemoArguments),
+    /// Run the service on a robot: map, know where it is, go where it shall, stop in time.
+    Run(service::RunArguments),
+    /// Be a robot and its LiDAR, in real time, for `hachi run` to be tried on.
+    Simulate(service::SimulateArguments),
+    /// Show the tasks of a running service, live.
+    Top(service::TopArguments),
     /// Turn captured packets into one cloud file per turn.
     Decode(mapping::DecodeArguments),
     /// Map a recording: trajectory, map, picture and report.

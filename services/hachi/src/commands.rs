@@ -12,6 +12,9 @@ pub mod map;
 pub mod model;
 pub mod people;
 pub mod replay;
+pub mod run;
+pub mod simulate;
+pub mod top;
 
 use crate::cli::graph::Graph;
 use crate::cli::{Command, Eval};
@@ -24,6 +27,9 @@ use crate::exit::Failure;
 pub fn dispatch(command: Command) -> Result<(), Failure> {
     match command {
         Command::Demo(arguments) => demo::run(&arguments),
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Top(arguments) => top::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Eval(Eval::Loops(arguments)) => eval_loops::run(&arguments),

@@ -3,8 +3,10 @@
 //! Every stage owns its own section; keys that nobody knows are refused with their place in the
 //! file. Angles are degrees here and radians inside.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use hachi_behaviour::{PatrolConfig, SafetyConfig};
 use hachi_cloud::FilterConfig;
 use hachi_hal::{Pose, Rotation, Vector3};
 use hachi_odometry::OdometryConfig;
@@ -12,6 +14,7 @@ use hachi_slam::SlamConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
+use crate::service::settings::{LidarConfig, RobotConfig, RowConfig, ServiceConfig};
 
 /// What is known of the motion besides the scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -81,12 +84,191 @@ pub struct MappingConfig {
     pub map: MapConfig,
 }
 
-/// Platforms with their settings, each over the defaults.
+/// What lies below every platform's settings.
+const BASE: &str = include_str!("../../../config/base.toml");
+
+/// Platforms with their settings, each over the base's.
 const PLATFORMS: [(&str, &str); 3] = [
     ("b1", include_str!("../../../config/b1.toml")),
     ("go1", include_str!("../../../config/go1.toml")),
     ("kairos", include_str!("../../../config/kairos.toml")),
 ];
+
+/// Everything that a file of settings may say: how a robot is mapped, and how it is run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Where the LiDAR sits on the robot's base.
+    pub base_from_lidar: Mount,
+    /// Where the IMU sits on the LiDAR; only its rotation matters.
+    pub lidar_from_imu: Mount,
+    /// What is known of the motion besides the scans.
+    pub motion: MotionInput,
+    /// Filters.
+    pub filter: FilterConfig,
+    /// Odometry.
+    pub odometry: OdometryConfig,
+    /// SLAM.
+    pub slam: SlamConfig,
+    /// The map.
+    pub map: MapConfig,
+    /// The robot.
+    pub robot: RobotConfig,
+    /// The LiDAR's packets.
+    pub lidar: LidarConfig,
+    /// Limits of the gate.
+    pub safety: SafetyConfig,
+    /// Where it goes.
+    pub patrol: PatrolConfig,
+    /// The program itself.
+    pub service: ServiceConfig,
+    /// Rows of the task table that differ from the usual.
+    pub task: BTreeMap<String, RowConfig>,
+}
+
+impl Settings {
+    /// The settings of a platform (or none) with those of a file (or none) over them.
+    ///
+    /// # Errors
+    /// No such platform; the file can't be read, or says something that is not understood.
+    pub fn load(platform: Option<&str>, file: Option<&Path>) -> Result<Self, Failure> {
+        let text = match file {
+            Some(path) => Some(read(path)?),
+            None => None,
+        };
+        let name = file.map_or_else(String::new, |path| path.display().to_string());
+        let mut own = toml::Table::new();
+        let mut named = None;
+        if let Some(text) = &text {
+            // Checked on its own first: only then does the error know the line.
+            let alone = toml::from_str::<Self>(text).map_err(|error| wrong(&name, &error))?;
+            named = alone.robot.platform;
+            own = parse(text, &name)?;
+        }
+        let mut table = parse(BASE, "config/base.toml")?;
+        if let Some(platform) = platform.map(ToOwned::to_owned).or(named) {
+            merge(&mut table, parse(platform_file(&platform)?, &platform)?);
+        }
+        merge(&mut table, own);
+        let mut settings: Self = table
+            .try_into()
+            .map_err(|error| wrong("the settings", &error))?;
+        if let Some(platform) = platform {
+            settings.robot.platform = Some(platform.to_owned());
+        }
+        settings.odometry.base_from_lidar = settings.base_from_lidar.pose();
+        settings.odometry.lidar_from_imu = settings.lidar_from_imu.pose().rotation;
+        settings
+            .check()
+            .map_err(|unworkable| unworkable.failure(&name, text.as_deref()))?;
+        Ok(settings)
+    }
+
+    /// Refuses what nothing can work with.
+    fn check(&self) -> Result<(), Unworkable> {
+        self.mapping().check()?;
+        self.safety.check().map_err(|error| Unworkable {
+            key: format!("safety.{}", error.key),
+            what: format!("{} can't work", error.value),
+            next_step: format!("give {}", error.wanted),
+        })?;
+        crate::service::settings::check(self)
+    }
+
+    /// The part that is about mapping.
+    pub fn mapping(&self) -> MappingConfig {
+        MappingConfig {
+            base_from_lidar: self.base_from_lidar,
+            lidar_from_imu: self.lidar_from_imu,
+            motion: self.motion,
+            filter: self.filter.clone(),
+            odometry: self.odometry.clone(),
+            slam: self.slam.clone(),
+            map: self.map,
+        }
+    }
+}
+
+/// The settings of a platform as they stand in its file.
+fn platform_file(name: &str) -> Result<&'static str, Failure> {
+    let file = PLATFORMS.iter().find(|(n, _)| *n == name);
+    file.map(|(_, text)| *text).ok_or_else(|| {
+        let known = PLATFORMS.map(|(n, _)| n).join(", ");
+        Failure::new(
+            format_args!("there is no platform {name:?}"),
+            format_args!("choose one of {known}, or leave it out"),
+        )
+    })
+}
+
+fn read(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|error| {
+        Failure::new(
+            format_args!("{} can't be read: {error}", path.display()),
+            "give the path of a TOML file",
+        )
+    })
+}
+
+/// A value that is understood and that nothing can work with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unworkable {
+    /// The key, with its section; empty where what is wrong names it.
+    pub key: String,
+    /// What is wrong with it.
+    pub what: String,
+    /// What to do.
+    pub next_step: String,
+}
+
+impl Unworkable {
+    /// As it is told: with the file and the line, where the file says it.
+    fn failure(&self, file: &str, text: Option<&str>) -> Failure {
+        let Self {
+            key,
+            what,
+            next_step,
+        } = self;
+        if key.is_empty() {
+            return Failure::new(what, next_step);
+        }
+        match text.and_then(|text| line_of(text, key)) {
+            Some(line) => Failure::new(
+                format_args!("{file}, line {line}: {key} = {what}"),
+                next_step,
+            ),
+            None => Failure::new(format_args!("{key} = {what}"), next_step),
+        }
+    }
+}
+
+/// The line on which a file sets a key: under its section, or with the section before it.
+fn line_of(text: &str, key: &str) -> Option<usize> {
+    let mut section = String::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.starts_with('[') {
+            section = line
+                .trim_matches(|c| c == '[' || c == ']')
+                .trim()
+                .to_owned();
+            continue;
+        }
+        let Some((name, _)) = line.split_once('=') else {
+            continue;
+        };
+        let name = name.trim();
+        let whole = match section.is_empty() {
+            true => name.to_owned(),
+            false => format!("{section}.{name}"),
+        };
+        // A key may also be set inside braces: then the table's line is the nearest.
+        if whole == key || key.starts_with(&format!("{whole}.")) {
+            return Some(index + 1);
+        }
+    }
+    None
+}
 
 impl MappingConfig {
     /// The settings of a platform (or none) with those of a file (or none) over them.
@@ -94,47 +276,16 @@ impl MappingConfig {
     /// # Errors
     /// No such platform; the file can't be read, or says something that is not understood.
     pub fn load(platform: Option<&str>, file: Option<&Path>) -> Result<Self, Failure> {
-        let mut table = toml::Table::new();
-        if let Some(name) = platform {
-            let text = PLATFORMS
-                .iter()
-                .find(|(n, _)| *n == name)
-                .map(|(_, text)| *text);
-            let text = text.ok_or_else(|| {
-                let known = PLATFORMS.map(|(n, _)| n).join(", ");
-                Failure::new(
-                    format_args!("there is no platform {name:?}"),
-                    format_args!("choose one of {known}, or leave --platform out"),
-                )
-            })?;
-            merge(&mut table, parse(text, name)?);
-        }
-        if let Some(path) = file {
-            let text = std::fs::read_to_string(path).map_err(|error| {
-                Failure::new(
-                    format_args!("{} can't be read: {error}", path.display()),
-                    "give the path of a TOML file",
-                )
-            })?;
-            // Checked on its own first: only then does the error know the line.
-            let name = path.display().to_string();
-            toml::from_str::<Self>(&text).map_err(|error| wrong(&name, &error))?;
-            merge(&mut table, parse(&text, &name)?);
-        }
-        let mut config: Self = table
-            .try_into()
-            .map_err(|error| wrong("the settings", &error))?;
-        config.odometry.base_from_lidar = config.base_from_lidar.pose();
-        config.odometry.lidar_from_imu = config.lidar_from_imu.pose().rotation;
-        config.check()?;
-        Ok(config)
+        Ok(Settings::load(platform, file)?.mapping())
     }
 
     /// Refuses what no stage can work with.
-    fn check(&self) -> Result<(), Failure> {
-        self.filter
-            .check()
-            .map_err(|error| Failure::new(error, "correct the [filter] section"))?;
+    fn check(&self) -> Result<(), Unworkable> {
+        self.filter.check().map_err(|error| Unworkable {
+            key: String::new(),
+            what: error.to_string(),
+            next_step: "correct the [filter] section".to_owned(),
+        })?;
         let odometry = &self.odometry;
         let positive = [
             ("odometry.target_points", odometry.target_points as f64),
@@ -179,10 +330,11 @@ impl MappingConfig {
         ];
         for (key, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(Failure::new(
-                    format_args!("{key} = {value} can't work"),
-                    "give a finite number above 0",
-                ));
+                return Err(Unworkable {
+                    key: key.to_owned(),
+                    what: format!("{value} can't work"),
+                    next_step: "give a finite number above 0".to_owned(),
+                });
             }
         }
         for (name, mount) in [
@@ -192,10 +344,11 @@ impl MappingConfig {
             for (key, values) in [("xyz_m", mount.xyz_m), ("rpy_deg", mount.rpy_deg)] {
                 // Farther than any robot is long: a slip of the unit, and then of every pose.
                 if !values.iter().all(|v| v.abs() < 1e3) {
-                    return Err(Failure::new(
-                        format_args!("{name}.{key} = {values:?} can't work"),
-                        "give three finite numbers below 1000",
-                    ));
+                    return Err(Unworkable {
+                        key: format!("{name}.{key}"),
+                        what: format!("{values:?} can't work"),
+                        next_step: "give three finite numbers below 1000".to_owned(),
+                    });
                 }
             }
         }

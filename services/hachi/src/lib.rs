@@ -12,6 +12,8 @@
 //! | [`log`] | logging |
 //! | [`mapping`] | the flow from scans to trajectory and map: read it first |
 //! | [`recording`], [`motion_samples`] | recordings of any kind as scans and samples |
+//! | [`record`] | what a run has done so far |
+//! | [`service`] | the service on a robot, task by task |
 //! | [`config`] | settings |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
 //! | [`images`] | folders of images |
@@ -19,6 +21,7 @@
 //! | [`mot_files`] | files of boxes and tracks |
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
+//! | [`task_table`] | the task table as people read it |
 //! | [`results`] | the files of a run |
 //! | [`saved_maps`] | saved maps as the commands open them |
 
@@ -39,11 +42,14 @@ pub mod networks;
 pub mod output;
 pub mod precision_recall_picture;
 pub mod progress;
+pub mod record;
 pub mod recording;
 pub mod report;
 pub mod results;
 pub mod saved_maps;
+pub mod service;
 pub mod slam_stage;
+pub mod task_table;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -56,6 +62,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return exit::usage(&error),
     };
-    let outcome = log::start(cli.log.as_deref()).and_then(|()| commands::dispatch(cli.command));
+    // A service that runs for weeks says what happens without being asked.
+    let usual = matches!(cli.command, cli::Command::Run(_)).then_some("info");
+    let outcome =
+        log::start(cli.log.as_deref(), usual).and_then(|()| commands::dispatch(cli.command));
     exit::status(outcome)
 }

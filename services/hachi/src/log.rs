@@ -9,18 +9,22 @@ use crate::exit::Failure;
 /// Where the filter comes from when `--log` is not given.
 const VARIABLE: &str = "HACHI_LOG";
 
-/// Starts logging with this filter, or the one in `HACHI_LOG`; without either nothing is logged.
+/// Starts logging with this filter, or the one in `HACHI_LOG`, or the usual one; without any nothing
+/// is logged.
 ///
 /// A filter is a level (`info`) or levels by module (`hachi=debug,hachi_odometry=trace`).
 ///
 /// # Errors
 /// The filter can't be understood.
-pub fn start(filter: Option<&str>) -> Result<(), Failure> {
+pub fn start(filter: Option<&str>, usual: Option<&str>) -> Result<(), Failure> {
     let from_environment = std::env::var(VARIABLE).ok().filter(|v| !v.is_empty());
     let (filter, source) = match (filter, &from_environment) {
         (Some(filter), _) => (filter, "--log"),
         (None, Some(filter)) => (filter.as_str(), VARIABLE),
-        (None, None) => return Ok(()),
+        (None, None) => match usual {
+            Some(usual) => (usual, "the usual filter"),
+            None => return Ok(()),
+        },
     };
     let parsed = EnvFilter::builder().parse(filter).map_err(|error| {
         Failure::Usage(format!(

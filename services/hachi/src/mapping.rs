@@ -6,21 +6,21 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use hachi_cloud::{Filtered, Filters, IntensityUse, RemovalCounts, ScanFrames};
+use hachi_cloud::{Filters, ScanFrames};
 use hachi_hal::{ImuSample, OdometrySample, Point, Pose, ScanHeader, Stamp};
-use hachi_odometry::{Condition, Estimate, Odometry, ScanInput};
+use hachi_odometry::{Estimate, Odometry, ScanInput};
 use hachi_slam::{Slam, SlamEstimate};
 use hachi_trajectory::Trajectory;
 use indicatif::ProgressBar;
-use tracing::{info, warn};
 
 use crate::config::{MappingConfig, MotionInput};
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::map_builder::MapBuilder;
 use crate::motion_samples::MotionSamples;
+use crate::record::RunRecord;
 use crate::recording::ScanSource;
-use crate::report::{ConditionCounts, Report, RunState, StageRecorder, peak_rss_mb};
+use crate::report::{Report, RunState, StageRecorder};
 use crate::slam_stage::SlamStage;
 
 const STAGES: [&str; 5] = ["read", "filter", "odometry", "slam", "map"];
@@ -48,16 +48,10 @@ pub struct Mapping {
     kept: Vec<Point>,
     slam: Option<SlamStage>,
     map: MapBuilder,
-    trajectory: Trajectory,
+    record: RunRecord,
     /// Where the last scan that the map took in was.
     mapped_at: Option<Pose>,
     times: StageRecorder,
-    removed: RemovalCounts,
-    conditions: ConditionCounts,
-    condition: Condition,
-    intensity: Option<IntensityUse>,
-    scans: u64,
-    points: u64,
 }
 
 impl Mapping {
@@ -79,15 +73,9 @@ impl Mapping {
             kept: Vec::new(),
             slam: None,
             map: MapBuilder::new(config.map.voxel_m, scratch),
-            trajectory: Trajectory::new(),
+            record: RunRecord::new(true),
             mapped_at: None,
             times: StageRecorder::new(&STAGES),
-            removed: RemovalCounts::of(&[]),
-            conditions: ConditionCounts::default(),
-            condition: Condition::Ok,
-            intensity: None,
-            scans: 0,
-            points: 0,
             config,
         })
     }
@@ -135,7 +123,9 @@ impl Mapping {
         self.times.stage(FILTER, filtered_at - start);
         self.times.stage(ODOMETRY, placed_at - filtered_at);
         self.times.stage(stage, placed_at.elapsed());
-        self.account(points.len(), &filtered, &estimate);
+        let pose = self.map_from_base(&estimate.odom_from_lidar);
+        self.record
+            .account(points.len(), &filtered, &estimate, pose);
         estimate
     }
 
@@ -172,33 +162,6 @@ impl Mapping {
         }
     }
 
-    fn account(&mut self, points: usize, filtered: &Filtered, estimate: &Estimate) {
-        let pose = self.map_from_base(&estimate.odom_from_lidar);
-        if self.trajectory.push(estimate.stamp, pose).is_err() {
-            warn!(stamp = %estimate.stamp, "a scan is not later than the one before it");
-        }
-        self.scans += 1;
-        self.points += points as u64;
-        self.removed += filtered.counts;
-        self.conditions.count(&estimate.condition);
-        if estimate.condition != self.condition {
-            info!(scan = self.scans - 1, "{}", estimate.condition);
-            self.condition = estimate.condition;
-        }
-        if self.intensity != Some(filtered.intensity) {
-            match filtered.intensity {
-                IntensityUse::NoSignal => warn!(
-                    "the scans carry no usable intensities: the intensity filter removes nothing"
-                ),
-                IntensityUse::NoGround => warn!(
-                    "the ground is not found: the intensity filter removes nothing until it is"
-                ),
-                IntensityUse::Off | IntensityUse::Ran => {}
-            }
-            self.intensity = Some(filtered.intensity);
-        }
-    }
-
     /// The end of a recording: with SLAM, the work under way is finished, and trajectory and map are
     /// made anew from all that was learnt.
     ///
@@ -209,7 +172,7 @@ impl Mapping {
             return Ok(());
         };
         slam.finish();
-        self.trajectory = slam.trajectory();
+        self.record.trajectory = slam.trajectory();
         slam.build_map(&mut self.map)
     }
 
@@ -217,7 +180,7 @@ impl Mapping {
     pub fn odometry(&self) -> Trajectory {
         self.slam
             .as_ref()
-            .map_or_else(|| self.trajectory.clone(), SlamStage::odometry)
+            .map_or_else(|| self.record.trajectory.clone(), SlamStage::odometry)
     }
 
     /// Where the last scan was on the map, with SLAM.
@@ -232,12 +195,17 @@ impl Mapping {
 
     /// The poses so far, `map_from_base`.
     pub fn trajectory(&self) -> &Trajectory {
-        &self.trajectory
+        &self.record.trajectory
     }
 
     /// The map so far.
     pub fn map(&self) -> &MapBuilder {
         &self.map
+    }
+
+    /// The map, of a run that is over.
+    pub fn into_map(self) -> MapBuilder {
+        self.map
     }
 
     /// The points of the last scan that the filters left.
@@ -252,19 +220,7 @@ impl Mapping {
 
     /// What was done so far.
     pub fn report(&self) -> Report {
-        let mut report = Report {
-            scans: self.scans,
-            points: self.points,
-            duration_s: self.trajectory.duration_s(),
-            path_length_m: self.trajectory.path_length_m(),
-            threads: rayon::current_num_threads(),
-            peak_rss_mb: peak_rss_mb(),
-            conditions: self.conditions,
-            ..Report::default()
-        };
-        for (reason, count) in self.removed.iter() {
-            report.drop_for(reason, count);
-        }
+        let mut report = self.record.report(&self.record.trajectory);
         if let Some(slam) = &self.slam {
             report.loops = slam.loop_counts().into();
         }
@@ -312,7 +268,7 @@ pub fn run(
         };
         let read: Duration = start.elapsed();
         if header.end <= last_end {
-            mapping.count_repeated();
+            mapping.record.count_repeated();
             continue;
         }
         motion.read_until(last_end, header.end);
@@ -324,12 +280,6 @@ pub fn run(
         each(mapping, &header, &estimate);
         progress.set_message(estimate.condition.name());
         progress.inc(1);
-    }
-}
-
-impl Mapping {
-    fn count_repeated(&mut self) {
-        self.conditions.not_later += 1;
     }
 }
 

@@ -26,7 +26,8 @@ pub struct SlamStage {
     place: Option<SlamEstimate>,
     points: Vec<Point>,
     events: SlamEvents,
-    store_failed: bool,
+    store_fails: bool,
+    keeps_path: bool,
 }
 
 impl SlamStage {
@@ -39,8 +40,21 @@ impl SlamStage {
             scans: Vec::new(),
             points: Vec::new(),
             events: SlamEvents::default(),
-            store_failed: false,
+            store_fails: false,
+            keeps_path: true,
         }
+    }
+
+    /// Without the path of the session: a run without an end would fill the memory with it.
+    #[must_use]
+    pub fn without_path(mut self) -> Self {
+        self.keeps_path = false;
+        self
+    }
+
+    /// Whether the map could not be kept when that was last tried.
+    pub fn store_fails(&self) -> bool {
+        self.store_fails
     }
 
     /// One scan, placed by odometry.
@@ -54,10 +68,26 @@ impl SlamStage {
         let base_from_lidar = self.base_from_lidar;
         // The odometry frame is the base's first pose.
         let odom_from_base = base_from_lidar * estimate.odom_from_lidar * base_from_lidar.inverse();
-        self.scans.push((estimate.stamp, odom_from_base));
-        self.points.clear();
+        let mut points = std::mem::take(&mut self.points);
+        points.clear();
         if self.slam.wants_points(&odom_from_base, &estimate.condition) {
-            self.deskew(header, kept, odometry);
+            deskew_into(header, kept, odometry, &base_from_lidar, &mut points);
+        }
+        let placed = self.step_placed(estimate, odom_from_base, &points);
+        self.points = points;
+        placed
+    }
+
+    /// One scan, placed by odometry, its points in the base's frame as if taken at its end.
+    pub fn step_placed(
+        &mut self,
+        estimate: &Estimate,
+        odom_from_base: Pose,
+        points: &[Point],
+    ) -> SlamEstimate {
+        let base_from_lidar = self.base_from_lidar;
+        if self.keeps_path {
+            self.scans.push((estimate.stamp, odom_from_base));
         }
         let scan = ScanInput {
             stamp: estimate.stamp,
@@ -65,7 +95,7 @@ impl SlamStage {
             condition: estimate.condition,
             open: in_base(&estimate.fit.degeneracy, &base_from_lidar),
             base_from_sensor: base_from_lidar.translation.vector.into(),
-            points: &self.points,
+            points,
         };
         let placed = self.slam.step(&scan, &mut self.events);
         self.place = Some(placed);
@@ -82,23 +112,6 @@ impl SlamStage {
     pub fn finish(&mut self) {
         self.slam.finish(&mut self.events);
         self.say();
-    }
-
-    /// The kept points in the base's frame at the scan's end.
-    fn deskew(&mut self, header: &ScanHeader, kept: &[Point], odometry: &Odometry) {
-        let per_ns = 1.0 / (header.end - header.start).max(1) as f32;
-        let pose = self.base_from_lidar.cast::<f32>();
-        let (rotation, shift) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
-        self.points.extend(kept.iter().map(|point| {
-            let share = if header.has_point_times {
-                point.time_offset_ns as f32 * per_ns
-            } else {
-                1.0
-            };
-            let deskewed = odometry.deskew(point.position(), share);
-            let [x, y, z] = (rotation * nalgebra::Vector3::from(deskewed) + shift).into();
-            Point { x, y, z, ..*point }
-        }));
     }
 
     /// Tells people what happened.
@@ -119,11 +132,13 @@ impl SlamStage {
                 piece.0, target.0
             );
         }
-        for error in &self.events.store_errors {
-            if !self.store_failed {
+        if let Some(error) = self.events.store_errors.first() {
+            if !self.store_fails {
                 warn!(%error, "the map can't be kept for now; it goes on in memory");
             }
-            self.store_failed = true;
+            self.store_fails = true;
+        } else if !self.events.fixed.is_empty() {
+            self.store_fails = false;
         }
         for error in &self.events.graph_errors {
             warn!(%error, "the graph does not take a node or a loop");
@@ -227,8 +242,8 @@ pub fn ledger_table(map: &Map, scan_of: impl Fn(NodeId) -> Option<usize>) -> Str
 
 /// Heading of the ledger's table.
 pub const LEDGER_HEADING: &str = "from_scan,to_scan,accepted,reason,id,node,candidate,found_by,\
-distance_m,similarity,yaw_rad,graph_fitness,looks_fitness,overlap,inlier_share,residual_m,open,chi2,\
-agreeing,x_m,y_m,z_m,qx,qy,qz,qw\n";
+distance_m,similarity,yaw_rad,graph_fitness,looks_fitness,overlap,inlier_share,residual_m,seen_through,\
+open,chi2,agreeing,x_m,y_m,z_m,qx,qy,qz,qw\n";
 
 fn row(entry: &LedgerEntry, from: Option<usize>, to: Option<usize>) -> String {
     // A scan of another session has no number here; a figure that was not asked for none at all.
@@ -246,7 +261,7 @@ fn row(entry: &LedgerEntry, from: Option<usize>, to: Option<usize>) -> String {
         entry.candidate_from_node.rotation.coords,
     );
     format!(
-        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6}\n",
+        "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6}\n",
         index(from),
         index(to),
         entry.verdict.is_accepted(),
@@ -263,6 +278,7 @@ fn row(entry: &LedgerEntry, from: Option<usize>, to: Option<usize>) -> String {
         figure(entry.overlap),
         figure(entry.inlier_share),
         figure(entry.residual_m),
+        figure(entry.seen_through),
         entry.open,
         figure(entry.chi2),
         entry.agreeing,
@@ -274,6 +290,29 @@ fn row(entry: &LedgerEntry, from: Option<usize>, to: Option<usize>) -> String {
         q.z,
         q.w,
     )
+}
+
+/// Adds the kept points in the base's frame, as if taken at the scan's end.
+pub fn deskew_into(
+    header: &ScanHeader,
+    kept: &[Point],
+    odometry: &Odometry,
+    base_from_lidar: &Pose,
+    points: &mut Vec<Point>,
+) {
+    let per_ns = 1.0 / (header.end - header.start).max(1) as f32;
+    let pose = base_from_lidar.cast::<f32>();
+    let (rotation, shift) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
+    points.extend(kept.iter().map(|point| {
+        let share = if header.has_point_times {
+            point.time_offset_ns as f32 * per_ns
+        } else {
+            1.0
+        };
+        let deskewed = odometry.deskew(point.position(), share);
+        let [x, y, z] = (rotation * nalgebra::Vector3::from(deskewed) + shift).into();
+        Point { x, y, z, ..*point }
+    }));
 }
 
 /// What a scan left open, in the base's frame.

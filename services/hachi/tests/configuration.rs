@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hachi::config::MappingConfig;
+use hachi::config::{MappingConfig, Settings};
 
 /// Key and default of each table row; a default of "" is one that the file format can't say.
 fn documented() -> BTreeMap<String, String> {
@@ -41,7 +41,7 @@ fn flatten(prefix: &str, value: &toml::Value, keys: &mut BTreeMap<String, String
 #[test]
 fn every_key_of_the_default_settings_stands_there_with_its_default() {
     let mut known = BTreeMap::new();
-    let value = toml::Value::try_from(MappingConfig::default()).unwrap();
+    let value = toml::Value::try_from(Settings::default()).unwrap();
     flatten("", &value, &mut known);
     assert!(known.len() > 20, "{known:?}");
     let documented = documented();
@@ -62,12 +62,20 @@ fn every_key_that_stands_there_is_understood() {
             ("filter.reject.low" | "filter.reject.high", _) => {
                 "filter.reject = { low = 0.0, high = 15.0 }".to_owned()
             }
+            ("robot.platform", _) => "robot.platform = \"b1\"".to_owned(),
+            ("robot.address", _) => "robot.address = \"10.0.0.1:8082\"".to_owned(),
+            ("lidar.source_address", _) => "lidar.source_address = \"10.0.0.2\"".to_owned(),
+            ("robot.local_port" | "task.slam.priority" | "task.slam.core", _) => {
+                format!("{key} = 1")
+            }
+            ("service.map", _) => "service.map = \"a.map\"".to_owned(),
+            ("task.slam.overrun", _) => "task.slam.overrun = \"skip\"".to_owned(),
             (key, "") => format!("{key} = 1.0"),
             (key, default) => format!("{key} = {default}"),
         };
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), &text).unwrap();
-        MappingConfig::load(None, Some(file.path())).unwrap_or_else(|e| panic!("{text}: {e}"));
+        Settings::load(None, Some(file.path())).unwrap_or_else(|e| panic!("{text}: {e}"));
     }
 }
 

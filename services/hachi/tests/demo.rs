@@ -123,3 +123,55 @@ fn what_the_help_calls_results_is_there_and_nothing_half_written() {
     );
     assert!(tum(&out.join("truth.tum")).len() >= 9);
 }
+
+/// The whole service in virtual time: every file but the report, which has times, is the same.
+#[test]
+fn one_thread_and_two_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let walk = |threads: &str| {
+        let out = folder.path().join(threads);
+        let arguments = ["demo", "--seconds", "4", "--headless", "--platform", "go1"];
+        let output = hachi()
+            .args(arguments)
+            .args(["--sensor", "helios16p", "--out", text(&out)])
+            .env("RAYON_NUM_THREADS", threads)
+            .output()
+            .unwrap();
+        assert!(
+            program::finished(output)
+                .success()
+                .contains("driven by the service")
+        );
+        out
+    };
+    let (one, two) = (walk("1"), walk("2"));
+    let report = whole_results(&one);
+    assert_eq!(
+        (&report["robot"], &report["threads"]),
+        (&"Go1".into(), &1.into())
+    );
+    assert!(
+        report["true_path_length_m"].as_f64().unwrap() > 1.0,
+        "{report}"
+    );
+    for name in names(&one).iter().filter(|name| *name != "report.json") {
+        let read = |out: &std::path::Path| std::fs::read(out.join(name)).unwrap();
+        assert!(read(&one) == read(&two), "{name} differs");
+    }
+}
+
+#[test]
+fn a_fixed_walk_is_walked_without_a_service() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = [
+        "demo",
+        "--seconds",
+        "1",
+        "--headless",
+        "--scripted",
+        "--out",
+    ];
+    let run = run(&[&arguments[..], &[text(folder.path())]].concat());
+    assert!(run.success().contains("a walking robot"), "{}", run.stdout);
+    assert!(whole_results(folder.path()).get("robot").is_none());
+}

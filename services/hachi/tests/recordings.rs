@@ -4,7 +4,8 @@ mod program;
 
 use std::path::Path;
 
-use program::{names, recording, report, run, text, tum, whole_results};
+use hachi_hal::{Pose, Rotation, Vector3};
+use program::{file, names, recording, report, run, text, tum, whole_results};
 use serde_json::Value;
 
 fn replay(input: &Path, out: &Path) -> Value {
@@ -166,46 +167,102 @@ fn a_damaged_bag_ends_with_what_could_be_read_or_a_reason() {
     }
 }
 
+/// `eval registration` of two clouds, from a guess.
+fn registered(source: &Path, target: &Path, guess: Option<&Pose>) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let base = ["eval", "registration", "--json"];
+    let clouds = ["--source", text(source), "--target", text(target)];
+    let mut arguments = [&base[..], &clouds[..]].concat();
+    let file = guess.map(|guess| {
+        let numbers = guess.to_homogeneous().transpose();
+        let numbers: Vec<_> = numbers.iter().map(f64::to_string).collect();
+        file(folder.path(), "guess.txt", &numbers.join(" "))
+    });
+    if let Some(file) = &file {
+        arguments.extend(["--guess", text(file)]);
+    }
+    run(&arguments).json()
+}
+
+/// How far an outcome is from the truth: metres and radians.
+fn off(outcome: &Value, truth: &Pose) -> (f64, f64) {
+    let numbers = outcome["target_from_source"].as_array().unwrap();
+    let numbers: Vec<f64> = numbers.iter().map(number).collect();
+    assert_eq!(numbers.len(), 16);
+    let off = truth.inv_mul(&pose_of(&numbers));
+    (off.translation.vector.norm(), off.rotation.angle())
+}
+
+/// A 4x4 matrix, row by row.
+fn pose_of(numbers: &[f64]) -> Pose {
+    let matrix = nalgebra::Matrix4::from_row_slice(numbers);
+    let rotation = Rotation::from_matrix(&matrix.fixed_view::<3, 3>(0, 0).into_owned());
+    let translation = matrix.fixed_view::<3, 1>(0, 3).into_owned();
+    Pose::from_parts(translation.into(), rotation)
+}
+
+fn numbers_in(path: &Path) -> Vec<f64> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let words = text.split_whitespace();
+    words.filter_map(|word| word.parse().ok()).collect()
+}
+
 /// Truth: `T_target_source.txt` beside the clouds.
 #[test]
 fn two_real_clouds_are_laid_over_each_other() {
     let Some(folder) = recording("registration/pair_a") else {
         return;
     };
-    let outcome = run(&[
-        "eval",
-        "registration",
-        "--source",
-        text(&folder.join("source.ply")),
-        "--target",
-        text(&folder.join("target.ply")),
-        "--json",
-    ])
-    .json();
-    let found: Vec<f64> = outcome["target_from_source"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(number)
-        .collect();
-    let truth: Vec<f64> = std::fs::read_to_string(folder.join("T_target_source.txt"))
-        .unwrap()
-        .split_whitespace()
-        .map(|n| n.parse().unwrap())
-        .collect();
-    assert_eq!((found.len(), truth.len()), (16, 16));
-    let off = (0..3)
-        .map(|r| (found[4 * r + 3] - truth[4 * r + 3]).powi(2))
-        .sum::<f64>()
-        .sqrt();
-    // The trace of R_found' R_true is 1 + 2 cos(angle).
-    let trace: f64 = (0..3)
-        .flat_map(|r| (0..3).map(move |c| 4 * r + c))
-        .map(|i| found[i] * truth[i])
-        .sum();
-    let angle_deg = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
-    assert!(off < 0.2 && angle_deg < 2.5, "{off} m, {angle_deg} degrees");
+    let truth = pose_of(&numbers_in(&folder.join("T_target_source.txt")));
+    let (source, target) = (folder.join("source.ply"), folder.join("target.ply"));
+    let outcome = registered(&source, &target, None);
+    let (metres, radians) = off(&outcome, &truth);
+    assert!(
+        metres < 0.2 && radians.to_degrees() < 2.5,
+        "{metres} m, {radians} rad"
+    );
     assert_eq!(outcome["converged"], true);
+}
+
+/// Truth: `graph.txt`, a pose for each submap. From guesses up to 0.6 m and 4 degrees off.
+#[test]
+fn neighbouring_submaps_of_a_drive_are_laid_over_each_other() {
+    let Some(folder) = recording("registration/kitti_07_submaps") else {
+        return;
+    };
+    // Each line: a name, which is no number, then x y z and the quaternion x y z w.
+    let numbers = numbers_in(&folder.join("graph.txt"));
+    let poses: Vec<_> = numbers
+        .chunks_exact(7)
+        .map(|v| {
+            let rotation = nalgebra::Quaternion::new(v[6], v[3], v[4], v[5]);
+            let translation = Vector3::new(v[0], v[1], v[2]);
+            Pose::from_parts(translation.into(), Rotation::from_quaternion(rotation))
+        })
+        .collect();
+    assert_eq!(poses.len(), 5);
+    let cloud = |i: usize| folder.join(format!("{i:06}/points.bin"));
+    for i in 0..4 {
+        let truth = poses[i].inv_mul(&poses[i + 1]);
+        for (shift, turn) in [
+            ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+            ([0.4, -0.4, 0.2], [0.02, -0.02, 0.06]),
+            ([-0.5, 0.3, -0.1], [-0.01, 0.02, -0.07]),
+        ] {
+            let guess = truth * Pose::new(Vector3::from(shift), Vector3::from(turn));
+            let outcome = registered(&cloud(i + 1), &cloud(i), Some(&guess));
+            let (metres, radians) = off(&outcome, &truth);
+            #[allow(clippy::print_stderr, reason = "the figures are worth reading")]
+            {
+                eprintln!("submap {} on {i}: {metres:.4} m, {radians:.5} rad", i + 1);
+            }
+            assert!(
+                metres < 0.15 && radians < 0.015,
+                "{i}: {metres} m, {radians} rad"
+            );
+            assert_eq!(outcome["converged"], true);
+        }
+    }
 }
 
 #[test]

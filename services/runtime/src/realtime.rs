@@ -4,8 +4,9 @@
 //! wish: without the rights for it a task runs under the normal scheduler and says so.
 //!
 //! `SCHED_DEADLINE` enforces a budget: the kernel sets aside `budget` in each period and lets the
-//! task wait for the next one when it is used up (`sched_deadline(7)`, `man 7 sched`). It takes no
-//! thread that is bound to a core, so that a task with a core of its own runs under `SCHED_FIFO`.
+//! task wait for the next one when it is used up (`man 7 sched`). It takes no thread that is bound to
+//! a core, and takes the rest of the budget from one that yields, so that tasks with a core of their
+//! own or with helpers run under `SCHED_FIFO`.
 #![allow(
     unsafe_code,
     reason = "the standard library has no calls for any of this"
@@ -72,7 +73,7 @@ const LEAST_RUNTIME_NS: i64 = 1_024;
 
 /// Schedules the calling thread as its row wants, as well as the kernel lets it.
 pub fn schedule(spec: &TaskSpec) -> Scheduling {
-    if spec.core.is_none() && deadline(spec).is_ok() {
+    if spec.core.is_none() && !spec.parallel && deadline(spec).is_ok() {
         return Scheduling::Deadline;
     }
     if let Some(core) = spec.core
@@ -226,6 +227,7 @@ mod tests {
             budget_ns: 1_000_000,
             priority: 10,
             core: None,
+            parallel: false,
             overrun: Overrun::Skip,
             hard: false,
             ladder: &[],

@@ -64,6 +64,10 @@ pub struct TaskSpec {
     pub priority: u8,
     /// The core it keeps to.
     pub core: Option<usize>,
+    /// Whether it works with helper threads. It then waits for them by yielding, which under
+    /// `SCHED_DEADLINE` gives up the rest of the period's budget (`sched_yield(2)`): measured,
+    /// 8 ms of odometry took 300. Such a task runs under `SCHED_FIFO`.
+    pub parallel: bool,
     /// What happens when a run takes longer.
     pub overrun: Overrun,
     /// Whether an overrun breaks a promise, and its silence means that the program hangs.

@@ -22,6 +22,9 @@ const FINE_ITERATIONS: usize = 12;
 /// Iterations made in one step.
 const COARSE_AT_ONCE: usize = 8;
 const FINE_AT_ONCE: usize = 2;
+/// Of guesses that stand for different places, one that fits less than this share of what the best
+/// fits is none.
+const WORTH: f64 = 0.6;
 /// A direction of which the surfaces say less than this share of what they say of the best one is
 /// left to the guess: see `hachi_registration::Degeneracy`.
 const OPEN_SHARE: f64 = 0.003;
@@ -71,6 +74,8 @@ pub struct Alignment {
     fine: Vec<SurfacePoint>,
     guesses: Vec<Trial>,
     phase: Phase,
+    /// Not the best guess alone is refined, but each that is worth it.
+    each: bool,
 }
 
 /// A guess, and how far it was followed.
@@ -79,6 +84,8 @@ struct Trial {
     pose: Pose,
     iterations: usize,
     done: bool,
+    /// It has been answered.
+    told: bool,
     fitness: Fitness,
 }
 
@@ -101,8 +108,10 @@ impl Alignment {
             pose,
             iterations: 0,
             done: false,
+            told: false,
             fitness: Fitness::default(),
         }));
+        self.each = false;
         self.phase = if guesses.is_empty() {
             Phase::Idle
         } else {
@@ -114,6 +123,18 @@ impl Alignment {
     pub fn begin_close(&mut self, source: &Surfaces, guess: &Pose) {
         self.begin(source, &[*guess]);
         self.phase = Phase::Fine;
+    }
+
+    /// Begins with guesses that stand for different places: [`Alignment::step`] answers for each that
+    /// leads about as far as the best, until [`Alignment::is_over`].
+    pub fn begin_each(&mut self, source: &Surfaces, guesses: &[Pose]) {
+        self.begin(source, guesses);
+        self.each = true;
+    }
+
+    /// Whether there is nothing left to do.
+    pub fn is_over(&self) -> bool {
+        self.phase == Phase::Idle
     }
 
     /// How well each guess fits, as far as it was followed with few surfaces.
@@ -160,6 +181,7 @@ impl Alignment {
             || iterations >= COARSE_ITERATIONS
             || (found.converged && trial.iterations > 0);
         self.guesses[index] = Trial {
+            told: false,
             pose: found.target_from_source,
             // The wide reach counts as one round, however soon it came to rest.
             iterations: iterations.max(COARSE_AT_ONCE),
@@ -175,14 +197,29 @@ impl Alignment {
         }
     }
 
-    /// The guess that led farthest; of equals the earlier.
-    fn best(&self) -> usize {
+    /// Of the guesses that were not answered the one that led farthest; of equals the earlier.
+    fn best(&self) -> Option<usize> {
         let fit = |i: usize| self.guesses[i].fitness.fit_share;
-        (0..self.guesses.len()).fold(0, |best, i| if fit(i) > fit(best) { i } else { best })
+        (0..self.guesses.len())
+            .filter(|&i| !self.guesses[i].told)
+            .reduce(|best, i| if fit(i) > fit(best) { i } else { best })
+    }
+
+    /// Whether another guess is worth an answer of its own.
+    fn goes_on(&self) -> bool {
+        let fit = |t: &Trial| t.fitness.fit_share;
+        let most = self.guesses.iter().map(fit).fold(0.0, f64::max);
+        self.each
+            && self
+                .best()
+                .is_some_and(|i| fit(&self.guesses[i]) >= WORTH * most)
     }
 
     fn fine_step(&mut self, target: &Surfaces) -> Option<Aligned> {
-        let guess = self.best();
+        let Some(guess) = self.best() else {
+            self.phase = Phase::Idle;
+            return None;
+        };
         let trial = self.guesses[guess];
         let iterations = if trial.done { 0 } else { trial.iterations };
         let cell = target.voxel_m();
@@ -209,7 +246,10 @@ impl Alignment {
         if !over {
             return None;
         }
-        self.phase = Phase::Idle;
+        self.guesses[guess].told = true;
+        if !self.goes_on() {
+            self.phase = Phase::Idle;
+        }
         Some(Aligned {
             found,
             fitness: judge(&self.fine, target, &found.target_from_source),

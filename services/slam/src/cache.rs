@@ -76,9 +76,22 @@ impl SubmapCache {
             entry.used = self.uses;
             return Ok(entry.submap.clone());
         }
-        store.submap(node, &mut self.encoded)?;
+        let mut encoded = std::mem::take(&mut self.encoded);
+        let submap = match store.submap(node, &mut encoded) {
+            Ok(()) => self.decode(node, &encoded),
+            Err(error) => Err(error),
+        };
+        self.encoded = encoded;
+        submap
+    }
+
+    /// Puts a submap in that comes as bytes.
+    ///
+    /// # Errors
+    /// They are not those of a submap.
+    pub fn decode(&mut self, node: NodeId, bytes: &[u8]) -> Result<Arc<Submap>, StoreError> {
         let mut submap = Submap::default();
-        codec::decode(&self.encoded, &mut submap).map_err(|error| StoreError {
+        codec::decode(bytes, &mut submap).map_err(|error| StoreError {
             fault: StoreFault::Damaged,
             message: format!("the submap of node {node} is damaged: {error}"),
         })?;

@@ -13,6 +13,7 @@ use crate::ledger::FoundBy;
 use crate::map::Map;
 use crate::node::{Node, NodeId, PieceId};
 use crate::places::node_of;
+use crate::recognition::Recognition;
 
 /// Half axes of the search ellipsoid where the place is known exactly, metres: what one sees from
 /// there, one sees from here.
@@ -26,6 +27,9 @@ const ALIKE: usize = 3;
 
 /// Alike places of other pieces that are looked at for each node.
 const RECOGNISED: usize = 8;
+
+/// A node this close to a place shows it, metres.
+const NEIGHBOUR_M: f64 = 8.0;
 
 /// Alignment finds its way from a guess this far off (metres, radians): nearness is asked while three
 /// standard deviations are below.
@@ -71,25 +75,53 @@ pub fn candidates(map: &mut Map, id: NodeId, config: &SlamConfig, out: &mut Vec<
     }
 }
 
-/// Nodes of other pieces that look alike, one for each place, most alike first.
-pub fn recognised(map: &Map, piece: PieceId, out: &mut Vec<Candidate>) {
+/// Where a node of a piece that hangs on nothing may be: the places that were thought of before, then
+/// nodes of other pieces that look alike, one for each place, most alike first.
+pub fn recognised(map: &Map, node: &Node, recognition: &mut Recognition, out: &mut Vec<Candidate>) {
+    out.clear();
+    let places: Vec<(PieceId, Pose)> = recognition.places().collect();
+    for (place, (target, target_from_piece)) in places.into_iter().enumerate() {
+        let target_from_node = target_from_piece * node.map_from_node;
+        match closest(map, target, &target_from_node) {
+            Some(old) => out.push(Candidate {
+                node: old.id,
+                found_by: FoundBy::Recognition,
+                looks: None,
+                proposed: Some(old.map_from_node.inv_mul(&target_from_node)),
+            }),
+            None => recognition.leads_off_the_map(node.id, place),
+        }
+    }
     let mut matches = Vec::new();
     let nodes = map.nodes();
-    let elsewhere = |id: NodeId| nodes.get(id.index()).is_some_and(|n| n.piece != piece);
+    let elsewhere = |id: NodeId| nodes.get(id.index()).is_some_and(|n| n.piece != node.piece);
     map.places.query(elsewhere, 3 * RECOGNISED, &mut matches);
-    out.clear();
+    let first = out.len();
     for found in matches {
-        let node = node_of(&found);
-        let known = |c: &Candidate| c.node.0.abs_diff(node.0) <= SAME_PLACE;
-        if out.len() < RECOGNISED && !out.iter().any(known) {
+        let old = node_of(&found);
+        let known = |c: &Candidate| c.node.0.abs_diff(old.0) <= SAME_PLACE;
+        if out.len() < first + RECOGNISED && !out[first..].iter().any(known) {
             out.push(Candidate {
-                node,
+                node: old,
                 found_by: FoundBy::Recognition,
                 looks: Some(found),
                 proposed: None,
             });
         }
     }
+}
+
+/// The node of a piece that is closest to a place, if there is one from which that can be seen.
+fn closest<'a>(map: &'a Map, piece: PieceId, place: &Pose) -> Option<&'a Node> {
+    let distance =
+        |n: &Node| (n.map_from_node.translation.vector - place.translation.vector).norm();
+    map.nodes()
+        .iter()
+        .filter(|n| n.piece == piece)
+        .map(|n| (n, distance(n)))
+        .filter(|(_, distance)| *distance <= NEIGHBOUR_M)
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(n, _)| n)
 }
 
 fn alike(

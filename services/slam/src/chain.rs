@@ -10,9 +10,10 @@ use nalgebra::Matrix6;
 use crate::alignment::{Aligned, Alignment};
 use crate::ground::laid_on;
 use crate::growing::GrownSubmap;
-use crate::map::{Map, difference, stepped};
+use crate::map::Map;
 use crate::node::NodeId;
 use crate::surfaces::Surfaces;
+use crate::tangent::{difference, stepped};
 use crate::uncertainty::{bounded, invert, metric_scale, translation_first};
 
 /// Surfaces farther than this from the node say no more about its place than near ones.

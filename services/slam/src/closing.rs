@@ -11,9 +11,11 @@ use crate::alignment::{Aligned, Alignment};
 use crate::candidates::Candidate;
 use crate::config::SlamConfig;
 use crate::ledger::{LedgerEntry, LoopId, Refusal, Verdict};
-use crate::map::{Map, difference};
+use crate::map::Map;
 use crate::node::{Node, NodeId};
+use crate::sight::Walls;
 use crate::surfaces::Surfaces;
+use crate::tangent::difference;
 use crate::uncertainty::of_alignment;
 
 /// Surfaces farther than this from either place are left out.
@@ -37,6 +39,9 @@ const MOST_CHI2: f64 = 22.46;
 /// How many others have to agree.
 const AGREEING: usize = 2;
 
+/// Share of what is seen that has to lie at a place of another piece for it to be looked at closely.
+const LEAST_LIKELY: f64 = 0.35;
+
 /// Loops that wait for others to agree.
 const MOST_WAITING: usize = 16;
 
@@ -55,6 +60,7 @@ pub struct Closing {
     target: Surfaces,
     source: Surfaces,
     alignment: Alignment,
+    walls: Walls,
     waiting: Vec<Proven>,
 }
 
@@ -105,18 +111,38 @@ impl Closing {
         if let Some(proposed) = candidate.proposed {
             add(proposed);
         }
-        self.alignment.begin(&self.source, &guesses[..count]);
+        if node.piece == old.piece {
+            self.alignment.begin(&self.source, &guesses[..count]);
+        } else {
+            // Nothing says which of them is right: each is judged by itself.
+            self.alignment.begin_each(&self.source, &guesses[..count]);
+        }
         true
     }
 
-    /// A step; the alignment when it is done.
+    /// A step; the alignment when it is done. Of a candidate on another piece there may be several,
+    /// one after the other, until [`Closing::is_over`].
     pub fn step(&mut self) -> Option<Aligned> {
         self.alignment.step(&self.target)
     }
 
+    /// Whether the candidate has been looked at from all sides.
+    pub fn is_over(&self) -> bool {
+        self.alignment.is_over()
+    }
+
+    /// Share of the lines of sight of either place that lead through surfaces of the other.
+    fn seen_through(&mut self, target_from_source: &Pose) -> f64 {
+        self.walls.gather(&self.target);
+        let there = self.walls.seen_through(&self.source, target_from_source);
+        self.walls.gather(&self.source);
+        let source_from_target = target_from_source.inverse();
+        there + self.walls.seen_through(&self.target, &source_from_target)
+    }
+
     /// Writes what was found into the entry, and says whether it is good by itself.
     pub fn judge(
-        &self,
+        &mut self,
         entry: &mut LedgerEntry,
         candidate: &Candidate,
         aligned: &Aligned,
@@ -133,19 +159,16 @@ impl Closing {
             entry.graph_fitness = of_guess(0);
         }
         if candidate.looks.is_some() {
-            let first = usize::from(same_piece);
-            let about = if same_piece {
-                f32::NAN
-            } else {
-                of_guess(first + 1)
-            };
-            entry.looks_fitness = of_guess(first).max(about);
+            entry.looks_fitness = of_guess(if same_piece { 1 } else { aligned.guess });
         }
         entry.overlap = fitness.overlap as f32;
         entry.inlier_share = fitness.inlier_share() as f32;
         entry.residual_m = fitness.residual_m as f32;
         entry.open = (found.degeneracy.translations + found.degeneracy.rotations) as u8;
         entry.candidate_from_node = found.target_from_source;
+        if !same_piece && fitness.fit_share >= LEAST_LIKELY {
+            entry.seen_through = self.seen_through(&found.target_from_source) as f32;
+        }
         if !found.converged {
             return Err(Refusal::NotConverged);
         }

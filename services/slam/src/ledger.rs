@@ -178,6 +178,9 @@ pub struct LedgerEntry {
     pub inlier_share: f32,
     /// Root mean square distance of these from it, metres.
     pub residual_m: f32,
+    /// Share of the lines of sight of either place that lead through surfaces of the other, both added
+    /// up; not a number where it was not asked.
+    pub seen_through: f32,
     /// Directions and axes that the surroundings leave open.
     pub open: u8,
     /// Squared Mahalanobis distance between alignment and graph, of six degrees of freedom less the
@@ -214,6 +217,7 @@ impl LedgerEntry {
             overlap: f32::NAN,
             inlier_share: f32::NAN,
             residual_m: f32::NAN,
+            seen_through: f32::NAN,
             open: 0,
             chi2: f32::NAN,
             agreeing: 0,

@@ -64,7 +64,7 @@ pub fn merge(
         if node.piece == PieceId(0) {
             candidates(&mut merged, id, config, &mut found);
         } else {
-            recognised(&merged, node.piece, &mut found);
+            recognised(&merged, &node, &mut recognition, &mut found);
         }
         for candidate in std::mem::take(&mut found) {
             prove(
@@ -77,7 +77,7 @@ pub fn merge(
             )?;
         }
         if node.piece != PieceId(0)
-            && let Some(place) = recognition.conclude(&merged, id)
+            && let Some(place) = recognition.conclude(id)
         {
             merged.join(
                 node.piece,
@@ -122,30 +122,36 @@ fn prove(
         map.close_entry(entry);
         return Ok(());
     }
-    let aligned = loop {
-        if let Some(aligned) = closing.step() {
-            break aligned;
-        }
-    };
-    match closing.judge(&mut entry, candidate, &aligned, same_piece, config) {
-        Err(refusal) => {
-            if !same_piece {
-                recognition.vote(map, &entry, None);
+    loop {
+        let aligned = loop {
+            if let Some(aligned) = closing.step() {
+                break aligned;
             }
-            entry.verdict = Verdict::Refused(refusal);
-            map.close_entry(entry);
+        };
+        match closing.judge(&mut entry, candidate, &aligned, same_piece, config) {
+            Err(refusal) => {
+                if !same_piece {
+                    recognition.vote(map, &entry, None);
+                }
+                entry.verdict = Verdict::Refused(refusal);
+                map.close_entry(entry);
+            }
+            Ok(proven) if !same_piece => {
+                recognition.vote(map, &entry, Some(proven.information));
+                map.close_entry(entry);
+            }
+            Ok(mut proven) => {
+                let loops = closing.agree(map, &mut proven);
+                map.close_entry(proven.entry);
+                map.add_loops(&loops)?;
+            }
         }
-        Ok(proven) if !same_piece => {
-            recognition.vote(map, &entry, Some(proven.information));
-            map.close_entry(entry);
+        if closing.is_over() {
+            return Ok(());
         }
-        Ok(mut proven) => {
-            let loops = closing.agree(map, &mut proven);
-            map.close_entry(proven.entry);
-            map.add_loops(&loops)?;
-        }
+        // The same two nodes lie on each other in another way too.
+        entry = map.open_entry(node.stamp, id, candidate.node, candidate.found_by);
     }
-    Ok(())
 }
 
 /// Copies a map into another, numbered on. The numbers its nodes got.

@@ -1,40 +1,67 @@
 //! Finding the way back: which place of the map a piece that hangs on nothing lies at.
 //!
-//! In: what alignment found at each place that looks like the present one, node after node. Out: where
-//! the whole piece lies, once enough speaks for one place and little for any other. Places that were
-//! refused count too, against: two corridors can look the same, and then both fit.
+//! In: what alignment found at each place that may be the present one, node after node. Out: where
+//! the whole piece lies, once one place explains what is seen clearly better than every other that
+//! was ever thought of. Two corridors can look alike, a corridor looks alike both ways: then both are
+//! followed, each is asked again at every further node, and nothing is said until one has lost.
+//! Elsewhere: which places are asked ([`candidates`](crate::candidates)), alignment and lines of sight
+//! ([`closing`](crate::closing)).
 
 use hachi_hal::Pose;
 use nalgebra::Matrix6;
 
 use crate::ledger::{LedgerEntry, LoopId};
-use crate::map::{Map, difference};
+use crate::map::Map;
 use crate::node::{NodeId, PieceId};
+use crate::tangent::difference;
 
-/// Votes that are kept; the oldest go.
-const MOST_VOTES: usize = 64;
+/// Places that are followed; the least likely goes.
+const MOST_PLACES: usize = 32;
 
-/// Two votes that place the robot this far apart, at most, say the same.
+/// Nodes that are remembered for each; the oldest go.
+const MOST_NODES: usize = 24;
+
+/// Two alignments that put the robot this far apart, at most, mean one place.
 const SAME_M: f64 = 0.6;
 const SAME_RAD: f64 = 0.06;
 
-/// Nodes that have to be proven at the same place, and how much more has to speak for it than for the
-/// next best.
+/// Share of the lines of sight that lead through walls at which a place is out of the question.
+const MOST_SEEN_THROUGH: f64 = 0.1;
+
+/// Likeness of a place that is out of the question, and of one that leads the robot off the map: the
+/// map says nothing there, but robots are seldom where no map is.
+const LEAST_LIKENESS: f64 = 0.05;
+const OFF_THE_MAP: f64 = 0.3;
+
+/// Nodes that have to be proven at a place, how likely it has to be at the last of them, and how much
+/// likelier than any other at the nodes that were asked of both (natural logarithm of the ratio,
+/// added up): a factor of 1.6.
 const AGREEING: usize = 2;
-const LEAD: f64 = 1.3;
+const LIKELY: f64 = 0.5;
+const LEAD: f64 = 0.47;
 
-/// One node is enough if so much of what it sees lies there, and so much less anywhere else.
-const ALONE_FIT: f64 = 0.7;
-const ALONE_LEAD: f64 = 1.8;
+/// One node is enough if so much of what it sees lies there, and so much less anywhere else: a factor
+/// of 2.2.
+const ALONE_LIKELY: f64 = 0.75;
+const ALONE_LEAD: f64 = 0.79;
 
-/// One node's word on where the piece lies.
-#[derive(Debug, Clone, Copy)]
-struct Vote {
-    node: NodeId,
+/// A place that lags behind the best by a factor of six is followed no further.
+const LOST_LEAD: f64 = 1.8;
+
+/// A place where the piece may lie.
+#[derive(Debug, Clone)]
+struct Place {
     target: PieceId,
     target_from_piece: Pose,
-    /// Share of what the node sees that lies on the map there.
-    fit: f64,
+    seen: Vec<Seen>,
+}
+
+/// What one node says of a place.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    node: NodeId,
+    /// Share of what the node sees that lies on the map there, less what it sees through.
+    likeness: f64,
     /// The loop it would be, if the alignment proved it.
     proven: Option<(LoopId, Matrix6<f64>)>,
 }
@@ -48,29 +75,22 @@ pub struct Found {
     pub target_from_piece: Pose,
     /// The loops that say so.
     pub loops: Vec<(LoopId, Matrix6<f64>)>,
+    /// Loops that say otherwise, and fitted by themselves.
+    pub lookalikes: Vec<LoopId>,
 }
 
-/// The votes on where the present piece lies.
+/// The places where the present piece may lie.
 #[derive(Debug, Default)]
 pub struct Recognition {
-    votes: Vec<Vote>,
+    places: Vec<Place>,
     nodes: usize,
     leading: usize,
-}
-
-/// What speaks for one place.
-#[derive(Debug, Clone, Copy, Default)]
-struct Support {
-    /// Nodes proven there.
-    proven: usize,
-    /// The best fits of all nodes, added up.
-    score: f64,
 }
 
 impl Recognition {
     /// Starts anew, for another piece.
     pub fn clear(&mut self) {
-        self.votes.clear();
+        self.places.clear();
         self.nodes = 0;
         self.leading = 0;
     }
@@ -85,6 +105,22 @@ impl Recognition {
         self.leading
     }
 
+    /// Where the piece may lie, as far as is known: `target_from_piece`, and on which.
+    pub fn places(&self) -> impl Iterator<Item = (PieceId, Pose)> + '_ {
+        self.places.iter().map(|p| (p.target, p.target_from_piece))
+    }
+
+    /// A place that would have a node where the map has none near.
+    pub fn leads_off_the_map(&mut self, node: NodeId, place: usize) {
+        if let Some(place) = self.places.get_mut(place) {
+            place.add(Seen {
+                node,
+                likeness: OFF_THE_MAP,
+                proven: None,
+            });
+        }
+    }
+
     /// Takes what was found for a candidate; `information` if it is proven.
     pub fn vote(&mut self, map: &Map, entry: &LedgerEntry, information: Option<Matrix6<f64>>) {
         let (Some(node), Some(old)) = (map.node(entry.node), map.node(entry.candidate)) else {
@@ -95,86 +131,138 @@ impl Recognition {
         if !fit.is_finite() {
             return;
         }
-        let target_from_node = old.map_from_node * entry.candidate_from_node;
-        if self.votes.len() >= MOST_VOTES {
-            self.votes.remove(0);
-        }
-        self.votes.push(Vote {
+        let seen_through = f64::from(entry.seen_through);
+        let seen = Seen {
             node: node.id,
-            target: old.piece,
-            target_from_piece: target_from_node * node.map_from_node.inverse(),
-            fit,
+            likeness: likeness(fit, seen_through),
             proven: information.map(|i| (entry.id, i)),
+        };
+        let target_from_node = old.map_from_node * entry.candidate_from_node;
+        let target_from_piece = target_from_node * node.map_from_node.inverse();
+        let known = self.places.iter_mut().find(|place| {
+            let there = place.target_from_piece * node.map_from_node;
+            place.target == old.piece && is_same(&there, &target_from_node)
+        });
+        if let Some(place) = known {
+            if place.add(seen) && information.is_some() {
+                place.target_from_piece = target_from_piece;
+            }
+            return;
+        }
+        if self.places.len() >= MOST_PLACES {
+            self.drop_least();
+        }
+        self.places.push(Place {
+            target: old.piece,
+            target_from_piece,
+            seen: vec![seen],
         });
     }
 
-    /// All candidates of a node were asked: where the piece lies, if that is decided now.
-    pub fn conclude(&mut self, map: &Map, node: NodeId) -> Option<Found> {
-        self.nodes += 1;
-        let piece_from_here = map.node(node)?.map_from_node;
-        let mut best: Option<(usize, Support)> = None;
-        for (i, vote) in self.votes.iter().enumerate() {
-            let support = self.support(vote, &piece_from_here);
-            if vote.proven.is_some() && best.is_none_or(|(_, b)| support.score > b.score) {
-                best = Some((i, support));
-            }
+    fn drop_least(&mut self) {
+        let last = |p: &Place| p.seen.last().map_or(0.0, |s| s.likeness);
+        let least = (0..self.places.len())
+            .min_by(|&a, &b| last(&self.places[a]).total_cmp(&last(&self.places[b])));
+        if let Some(least) = least {
+            self.places.remove(least);
         }
-        let (index, support) = best?;
-        let best = self.votes[index];
-        let rival = self
-            .votes
+    }
+
+    /// All candidates of a node were asked: where the piece lies, if that is decided now.
+    pub fn conclude(&mut self, node: NodeId) -> Option<Found> {
+        self.nodes += 1;
+        let best = (0..self.places.len())
+            .filter(|&i| self.places[i].at(node).is_some() && self.places[i].proven() > 0)
+            .max_by(|&a, &b| self.places[a].total().total_cmp(&self.places[b].total()));
+        let Some(best) = best.map(|i| self.places.swap_remove(i)) else {
+            self.leading = 0;
+            return None;
+        };
+        self.leading = best.proven();
+        self.places.retain(|rival| best.lead(rival) < LOST_LEAD);
+        let lead = self
+            .places
             .iter()
-            .filter(|v| !same(v, &best, &piece_from_here))
-            .map(|v| self.support(v, &piece_from_here).score)
-            .fold(0.0, f64::max);
-        self.leading = support.proven;
-        let together = support.proven >= AGREEING && support.score >= LEAD * rival;
-        let alone = best.fit >= ALONE_FIT && support.score >= ALONE_LEAD * rival;
+            .map(|rival| best.lead(rival))
+            .fold(f64::INFINITY, f64::min);
+        let likeness = best.at(node).unwrap_or(0.0);
+        let together = best.proven() >= AGREEING && likeness >= LIKELY && lead >= LEAD;
+        let alone = likeness >= ALONE_LIKELY && lead >= ALONE_LEAD;
         if !together && !alone {
+            self.places.insert(0, best);
             return None;
         }
-        let mut loops: Vec<(LoopId, Matrix6<f64>)> = Vec::new();
-        let mut nodes: Vec<NodeId> = Vec::new();
-        for vote in self.votes.iter().rev() {
-            if let Some(proven) = vote.proven
-                && same(vote, &best, &piece_from_here)
-                && !nodes.contains(&vote.node)
-            {
-                nodes.push(vote.node);
-                loops.push(proven);
-            }
-        }
+        let proven = |place: &Place| -> Vec<(LoopId, Matrix6<f64>)> {
+            place.seen.iter().filter_map(|s| s.proven).collect()
+        };
         Some(Found {
             target: best.target,
             target_from_piece: best.target_from_piece,
-            loops,
+            loops: proven(&best),
+            lookalikes: self
+                .places
+                .iter()
+                .flat_map(|place| proven(place).into_iter().map(|(id, _)| id))
+                .collect(),
         })
-    }
-
-    fn support(&self, of: &Vote, piece_from_here: &Pose) -> Support {
-        let mut fits: Vec<(NodeId, f64, bool)> = self
-            .votes
-            .iter()
-            .filter(|v| same(v, of, piece_from_here))
-            .map(|v| (v.node, v.fit, v.proven.is_some()))
-            .collect();
-        // The best of each node.
-        fits.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
-        fits.dedup_by_key(|f| f.0);
-        Support {
-            proven: fits.iter().filter(|f| f.2).count(),
-            score: fits.iter().map(|f| f.1).sum(),
-        }
     }
 }
 
-/// Whether two votes put the robot at the same place.
-fn same(a: &Vote, b: &Vote, piece_from_here: &Pose) -> bool {
-    let off = difference(
-        &(a.target_from_piece * piece_from_here),
-        &(b.target_from_piece * piece_from_here),
-    );
-    a.target == b.target
-        && off.fixed_rows::<3>(0).norm() < SAME_M
-        && off.fixed_rows::<3>(3).norm() < SAME_RAD
+impl Place {
+    /// Adds a node's word; of two of one node the better counts. Whether this one does.
+    fn add(&mut self, seen: Seen) -> bool {
+        if let Some(known) = self.seen.iter_mut().find(|s| s.node == seen.node) {
+            let better =
+                (seen.proven.is_some(), seen.likeness) > (known.proven.is_some(), known.likeness);
+            if better {
+                *known = seen;
+            }
+            return better;
+        }
+        if self.seen.len() >= MOST_NODES {
+            self.seen.remove(0);
+        }
+        self.seen.push(seen);
+        true
+    }
+
+    fn at(&self, node: NodeId) -> Option<f64> {
+        let seen = self.seen.iter().find(|s| s.node == node)?;
+        Some(seen.likeness)
+    }
+
+    fn proven(&self) -> usize {
+        self.seen.iter().filter(|s| s.proven.is_some()).count()
+    }
+
+    fn total(&self) -> f64 {
+        self.seen.iter().map(|s| s.likeness).sum()
+    }
+
+    /// How much likelier this is than a rival, by the nodes that were asked of both.
+    fn lead(&self, rival: &Self) -> f64 {
+        let both = self
+            .seen
+            .iter()
+            .filter_map(|s| Some((s.likeness, rival.at(s.node)?)));
+        both.map(|(here, there)| (here / there).ln()).sum()
+    }
+}
+
+/// How well a place explains what is seen, 0 to 1.
+fn likeness(fit: f64, seen_through: f64) -> f64 {
+    // What does not fit was not looked at closely.
+    let through = if seen_through.is_finite() {
+        seen_through
+    } else {
+        MOST_SEEN_THROUGH / 2.0
+    };
+    let share = (1.0 - through / MOST_SEEN_THROUGH).max(0.0);
+    (fit * share).max(LEAST_LIKENESS)
+}
+
+/// Whether two poses of the robot are one place.
+fn is_same(a: &Pose, b: &Pose) -> bool {
+    let off = difference(a, b);
+    off.fixed_rows::<3>(0).norm() < SAME_M && off.fixed_rows::<3>(3).norm() < SAME_RAD
 }

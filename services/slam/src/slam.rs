@@ -26,6 +26,8 @@ const MOST_WAITING: usize = 2;
 /// Steps of work made with each scan, and while a further submap waits.
 const STEPS: usize = 1;
 const STEPS_BEHIND: usize = 4;
+/// And while the place is not known: many places are asked then, and nothing else is as urgent.
+const STEPS_LOST: usize = 4;
 
 /// Least confidence in the ground's plane for the first scan to say which way is up.
 const UP_CONFIDENCE: f32 = 0.5;
@@ -45,6 +47,8 @@ pub struct Slam {
     map_from_odom: Pose,
     covariance: Matrix6<f64>,
     broken: bool,
+    /// The present scans hang on no node: the first submap since odometry broke has not become one.
+    adrift: bool,
 }
 
 impl Slam {
@@ -61,6 +65,7 @@ impl Slam {
             map_from_odom: Pose::identity(),
             covariance: Matrix6::identity() * 1e-6,
             broken: false,
+            adrift: false,
             config,
         }
     }
@@ -95,6 +100,7 @@ impl Slam {
         let up = self.which_way_is_up(scan);
         if self.odometry_broke(scan) {
             let rest = self.growing.break_off();
+            self.adrift = true;
             self.hand_over(rest, events);
             return self.estimate(scan);
         }
@@ -111,6 +117,7 @@ impl Slam {
         let steps = match self.waiting.len() {
             // Shaping a submap's surfaces was work enough.
             1 if full && self.workshop.is_free() => 0,
+            0 if self.workshop.is_floating(&self.map) => STEPS_LOST,
             0 => STEPS,
             _ => STEPS_BEHIND,
         };
@@ -222,6 +229,7 @@ impl Slam {
             if self.workshop.is_free()
                 && let Some(grown) = self.waiting.pop_front()
             {
+                self.adrift &= grown.way.is_some();
                 self.workshop
                     .begin(grown, &mut self.map, &self.map_from_odom, &self.config);
             }
@@ -251,7 +259,7 @@ impl Slam {
     }
 
     fn anchor(&self) -> Option<NodeId> {
-        self.workshop.last()
+        self.workshop.last().filter(|_| !self.adrift)
     }
 
     fn estimate(&self, scan: &ScanInput<'_>) -> SlamEstimate {
@@ -276,9 +284,10 @@ impl Slam {
             return (*odometry).into();
         }
         let floating = self.workshop.is_floating(&self.map);
-        if self.broken || floating {
+        if self.broken || self.adrift || floating {
             let recognition = self.workshop.recognition();
-            return match recognition.leading() {
+            let leading = if floating { recognition.leading() } else { 0 };
+            return match leading {
                 0 => SlamCondition::Lost(SlamDoubt::NotRecognised {
                     nodes: recognition.nodes(),
                 }),

@@ -13,6 +13,9 @@ use crate::submap::Submap;
 #[derive(Debug, Clone, Default)]
 pub struct Surfaces {
     points: Vec<SurfacePoint>,
+    /// The places that they were seen from, common frame; and for each surface its one.
+    eyes: Vec<[f32; 3]>,
+    eye_of: Vec<u16>,
     positions: Vec<[f32; 3]>,
     tree: KdTree,
     /// The coarsest cubes among the submaps, metres.
@@ -23,6 +26,8 @@ impl Surfaces {
     /// Empties it.
     pub fn clear(&mut self) {
         self.points.clear();
+        self.eyes.clear();
+        self.eye_of.clear();
         self.voxel_m = 0.0;
     }
 
@@ -38,16 +43,23 @@ impl Surfaces {
         let pose = frame_from_node.cast::<f32>();
         let (rotation, shift) = (pose.rotation.to_rotation_matrix(), pose.translation.vector);
         let near = radius_m * radius_m;
+        let place =
+            |p: [f32; 3]| -> [f32; 3] { (rotation * nalgebra::Vector3::from(p) + shift).into() };
         self.voxel_m = self.voxel_m.max(submap.voxel_m);
+        let first_eye = self.eyes.len();
+        self.eyes
+            .extend(submap.viewpoints.iter().map(|eye| place(*eye)));
         for p in &submap.points {
-            let position: [f32; 3] =
-                (rotation * nalgebra::Vector3::from(p.position) + shift).into();
+            let position = place(p.position);
             let distance_sq: f32 = (0..3).map(|a| (position[a] - centre[a]).powi(2)).sum();
             if distance_sq <= near {
                 self.points.push(SurfacePoint {
                     position,
                     normal: (rotation * nalgebra::Vector3::from(p.normal)).into(),
                 });
+                // Some tens of submaps with a few tens of places each.
+                let eye = first_eye + usize::from(p.viewpoint);
+                self.eye_of.push(u16::try_from(eye).unwrap_or(u16::MAX));
             }
         }
     }
@@ -63,6 +75,17 @@ impl Surfaces {
     /// All surfaces.
     pub fn points(&self) -> &[SurfacePoint] {
         &self.points
+    }
+
+    /// About `count` lines of sight, evenly picked: from where a surface was seen, and to where.
+    pub fn sights(&self, count: usize) -> impl Iterator<Item = [[f32; 3]; 2]> + '_ {
+        let total = self.points.len();
+        let picked = count.min(total);
+        (0..picked).filter_map(move |i| {
+            let index = i * total / picked;
+            let eye = self.eyes.get(usize::from(self.eye_of[index]))?;
+            Some([*eye, self.points[index].position])
+        })
     }
 
     /// The coarsest cubes among the submaps, metres.

@@ -267,9 +267,9 @@ impl Workshop {
         candidates(map, node, config, &mut self.found);
         rest.extend(self.found.drain(..));
         if self.is_floating(map)
-            && let Some(piece) = self.piece
+            && let Some(node) = map.node(node)
         {
-            recognised(map, piece, &mut self.found);
+            recognised(map, node, &mut self.recognition, &mut self.found);
             rest.extend(self.found.drain(..));
         }
         self.stage = Stage::Proving { node, rest };
@@ -292,7 +292,8 @@ impl Workshop {
             return work;
         };
         let mut entry = map.open_entry(stamp, node, candidate.node, candidate.found_by);
-        if hurry {
+        // Places that were thought of before are asked even so: without that nothing is ever decided.
+        if hurry && candidate.proposed.is_none() {
             refuse(map, entry, Refusal::NoTime, events);
             self.stage = Stage::Proving { node, rest };
         } else if self.closing.begin(map, &mut entry, &candidate, config) {
@@ -330,7 +331,18 @@ impl Workshop {
             };
             return Work::Going;
         };
-        self.stage = Stage::Proving { node, rest };
+        self.stage = if self.closing.is_over() {
+            Stage::Proving { node, rest }
+        } else {
+            // The same two nodes lie on each other in another way too.
+            let entry = map.open_entry(entry.stamp, node, candidate.node, candidate.found_by);
+            Stage::Aligned {
+                node,
+                rest,
+                candidate,
+                entry,
+            }
+        };
         let piece = |id: NodeId| map.node(id).map(|n| n.piece);
         let same_piece = piece(entry.node) == piece(entry.candidate);
         let judged = self
@@ -364,13 +376,18 @@ impl Workshop {
         if !self.is_floating(map) {
             return Work::Going;
         }
-        let found = self.recognition.conclude(map, node);
+        let found = self.recognition.conclude(node);
         let (Some(found), Some(piece)) = (found, self.piece) else {
             return Work::Going;
         };
         match map.join(piece, found.target, &found.target_from_piece, &found.loops) {
             Ok(decided) => {
                 events.ledger.extend(decided);
+                for id in found.lookalikes {
+                    if let Some(entry) = map.ledger().get(id.0 as usize).copied() {
+                        refuse(map, entry, Refusal::AgainstLoops, events);
+                    }
+                }
                 events.joined.push((piece, found.target));
                 events.moved = true;
                 self.piece = Some(found.target);

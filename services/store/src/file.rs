@@ -398,7 +398,7 @@ fn put(transaction: &Transaction<'_>, change: &MapChange<'_>) -> rusqlite::Resul
         transaction
             .prepare_cached(
                 "INSERT OR REPLACE INTO ledger VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, \
-                 ?12, ?13, ?14, ?15, ?16, ?17, ?18)",
+                 ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)",
             )?
             .execute(params![
                 l.id.0,
@@ -414,6 +414,7 @@ fn put(transaction: &Transaction<'_>, change: &MapChange<'_>) -> rusqlite::Resul
                 column(l.overlap),
                 column(l.inlier_share),
                 column(l.residual_m),
+                column(l.seen_through),
                 l.open,
                 column(l.chi2),
                 l.agreeing,

@@ -30,7 +30,7 @@ pub(crate) fn load(connection: &Connection) -> rusqlite::Result<SavedMap> {
         ledger: all(
             connection,
             "SELECT id, stamp_ns, node, candidate, found_by, similarity, yaw_rad, distance_m, \
-             graph_fitness, looks_fitness, overlap, inlier_share, residual_m, open, chi2, agreeing, \
+             graph_fitness, looks_fitness, overlap, inlier_share, residual_m, seen_through, open, chi2, agreeing, \
              candidate_from_node, verdict FROM ledger ORDER BY id",
             rows::ledger_entry,
         )?,

@@ -105,7 +105,7 @@ fn figure(row: &Row<'_>, column: usize) -> rusqlite::Result<f32> {
 
 pub(crate) fn ledger_entry(row: &Row<'_>) -> rusqlite::Result<LedgerEntry> {
     let word = |column: usize| -> rusqlite::Result<String> { row.get(column) };
-    let (by, verdict) = (word(4)?, word(17)?);
+    let (by, verdict) = (word(4)?, word(18)?);
     let found_by = FoundBy::ALL.into_iter().find(|f| f.name() == by);
     Ok(LedgerEntry {
         id: LoopId(row.get(0)?),
@@ -121,12 +121,13 @@ pub(crate) fn ledger_entry(row: &Row<'_>) -> rusqlite::Result<LedgerEntry> {
         overlap: figure(row, 10)?,
         inlier_share: figure(row, 11)?,
         residual_m: figure(row, 12)?,
-        open: row.get(13)?,
-        chi2: figure(row, 14)?,
-        agreeing: row.get(15)?,
-        candidate_from_node: pose(row, 16)?,
+        seen_through: figure(row, 13)?,
+        open: row.get(14)?,
+        chi2: figure(row, 15)?,
+        agreeing: row.get(16)?,
+        candidate_from_node: pose(row, 17)?,
         verdict: Verdict::from_name(&verdict)
-            .ok_or_else(|| odd(17, format!("verdict {verdict:?}")))?,
+            .ok_or_else(|| odd(18, format!("verdict {verdict:?}")))?,
     })
 }
 

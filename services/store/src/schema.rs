@@ -8,7 +8,7 @@ use rusqlite::limits::Limit;
 pub(crate) const APPLICATION_ID: i64 = 0x4841_434d;
 
 /// The tables' version. A change that older programs can't read adds one.
-pub(crate) const VERSION: i64 = 1;
+pub(crate) const VERSION: i64 = 2;
 
 /// The largest value of one column, bytes: a submap has 60 kB.
 const LARGEST_VALUE: i32 = 1 << 20;
@@ -33,7 +33,7 @@ CREATE TABLE ledger (
     id INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL, node INTEGER NOT NULL,
     candidate INTEGER NOT NULL, found_by TEXT NOT NULL, similarity REAL, yaw_rad REAL,
     distance_m REAL, graph_fitness REAL, looks_fitness REAL, overlap REAL, inlier_share REAL,
-    residual_m REAL, open INTEGER NOT NULL, chi2 REAL, agreeing INTEGER NOT NULL,
+    residual_m REAL, seen_through REAL, open INTEGER NOT NULL, chi2 REAL, agreeing INTEGER NOT NULL,
     candidate_from_node BLOB NOT NULL, verdict TEXT NOT NULL
 );
 ";

@@ -15,6 +15,7 @@
 //! | [`simulation`], [`lidar`] | packet after packet; as a [`hachi_hal::PacketSource`] |
 //! | [`imu`], [`odometry`] | the other sensors |
 //! | [`legs`] | joints, feet and body of a quadruped that walks the path |
+//! | [`commanded`], [`live`] | a quadruped that goes where it is told; the sensor on it |
 //! | [`loops`] | when the robot truly comes back to where it has been |
 //! | [`preset`] | ready-made buildings and campuses |
 //! | [`capture`] | pcap and TUM files |
@@ -34,6 +35,7 @@ mod building;
 mod calendar;
 mod campus;
 pub mod capture;
+pub mod commanded;
 mod fan;
 pub mod floor;
 mod ground;
@@ -41,6 +43,7 @@ mod helios;
 pub mod imu;
 pub mod legs;
 pub mod lidar;
+pub mod live;
 pub mod loops;
 pub mod material;
 pub mod motion;
@@ -59,10 +62,12 @@ pub mod trajectory;
 mod vlp16;
 
 pub use capture::{CaptureError, CaptureWriter, write_pcap, write_tum};
+pub use commanded::CommandedBody;
 pub use floor::{Floor, RaisedFloor, Terrain, Wave};
 pub use imu::{GRAVITY, ImuConfig, SimulatedImu};
 pub use legs::{LegDimensions, LegTick, LegsConfig, WalkingLegs};
 pub use lidar::{SimulatedLidar, SimulatedLidarError};
+pub use live::LiveLidar;
 pub use loops::{Direction, LoopPass, LoopSearch, Revisit, TrueLoops};
 pub use material::{Finish, Material};
 pub use motion::{Axis, BodyMotion, Harmonic};

@@ -7,7 +7,7 @@
 
 use std::f64::consts::TAU;
 
-use hachi_hal::Stamp;
+use hachi_hal::{Pose, Stamp};
 use parry3d::query::Ray;
 use rand::RngExt;
 
@@ -196,18 +196,27 @@ pub(crate) fn received_ns(sensor: SensorKind, index: u64) -> i64 {
     index as i64 * sensor.packet_ns() + sensor.last_firing_ns() + TRANSPORT_NS
 }
 
-/// Makes the `index`-th data packet.
+/// Makes the `index`-th data packet of a robot that follows its trajectory.
 pub(crate) fn make_packet(config: &SimulationConfig, index: u64, packet: &mut DataPacket) {
+    let pose_at = |after_ns: i64| config.trajectory.map_from_base(after_ns as f64 * 1e-9);
+    make_packet_at(config, index, &pose_at, packet);
+}
+
+/// Makes the `index`-th data packet with the base where `map_from_base` says for any time after the
+/// start, ns.
+pub(crate) fn make_packet_at(
+    config: &SimulationConfig,
+    index: u64,
+    map_from_base: &(dyn Fn(i64) -> Pose + Sync),
+    packet: &mut DataPacket,
+) {
     let (sensor, scene) = (config.sensor, &*config.scene);
     let begins_ns = index as i64 * sensor.packet_ns();
     let mut random = generator(config.seed, Purpose::Packets, index);
     let mut strays = Strays::new(config.seed, config.noise.stray_share, index);
     let mut reports = [Report::default(); 384];
     packet.truth = [ReturnTruth::default(); 384];
-    let pose_at = |offset_ns: i64| {
-        let time_s = (begins_ns + offset_ns) as f64 * 1e-9;
-        config.trajectory.map_from_base(time_s) * config.base_from_lidar
-    };
+    let pose_at = |offset_ns: i64| map_from_base(begins_ns + offset_ns) * config.base_from_lidar;
     let (head, casting) = (Head::new(sensor), &mut packet.casting);
     casting.rays.clear();
     for group in 0..sensor.groups() {

@@ -274,34 +274,8 @@ impl Trajectory {
         self.footprint_at(position, heading)
     }
 
-    fn footprint_at(&self, [x, y]: [f64; 2], heading: f64) -> Pose {
-        let (sin, cos) = heading.sin_cos();
-        let [along, across] = HALF_STANCE_M;
-        let foot = |f: f64, l: f64| {
-            self.floor
-                .raised_height(x + f * cos - l * sin, y + f * sin + l * cos)
-        };
-        let [front_left, front_right] = [foot(along, across), foot(along, -across)];
-        let [hind_left, hind_right] = [foot(-along, across), foot(-along, -across)];
-        // The terrain curves by a fraction of a millimetre under the feet: its plane is their plane.
-        let terrain = self.floor.terrain.as_ref();
-        let rise = terrain.map_or_else(Rising::default, |terrain| terrain.rise(x, y));
-        let slope_along = (front_left + front_right - hind_left - hind_right) / (4.0 * along)
-            + (rise.slope[0] * cos + rise.slope[1] * sin);
-        let slope_across = (front_left + hind_left - front_right - hind_right) / (4.0 * across)
-            + (rise.slope[1] * cos - rise.slope[0] * sin);
-        let height = (front_left + front_right + hind_left + hind_right) / 4.0 + rise.height;
-        // The plane's normal and its x axis, in a frame that only follows the heading.
-        let forward = Vector3::new(1.0, 0.0, slope_along).normalize();
-        let up = Vector3::new(-slope_along, -slope_across, 1.0).normalize();
-        let left = up.cross(&forward);
-        let forward = left.cross(&up);
-        let tilt = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[forward, left, up]));
-        Pose::from_parts(
-            Translation3::new(x, y, height),
-            Rotation::from_axis_angle(&Vector3::z_axis(), heading)
-                * Rotation::from_rotation_matrix(&tilt),
-        )
+    fn footprint_at(&self, position: [f64; 2], heading: f64) -> Pose {
+        footprint_on(&self.floor, position, heading)
     }
 
     /// The base: over the footprint, bobbing with the gait.
@@ -334,6 +308,34 @@ impl Trajectory {
     pub fn gait(&self) -> &Gait {
         &self.gait
     }
+}
+
+/// The footprint of a quadruped that stands on a floor.
+pub(crate) fn footprint_on(floor: &Floor, [x, y]: [f64; 2], heading: f64) -> Pose {
+    let (sin, cos) = heading.sin_cos();
+    let [along, across] = HALF_STANCE_M;
+    let foot = |f: f64, l: f64| floor.raised_height(x + f * cos - l * sin, y + f * sin + l * cos);
+    let [front_left, front_right] = [foot(along, across), foot(along, -across)];
+    let [hind_left, hind_right] = [foot(-along, across), foot(-along, -across)];
+    // The terrain curves by a fraction of a millimetre under the feet: its plane is their plane.
+    let terrain = floor.terrain.as_ref();
+    let rise = terrain.map_or_else(Rising::default, |terrain| terrain.rise(x, y));
+    let slope_along = (front_left + front_right - hind_left - hind_right) / (4.0 * along)
+        + (rise.slope[0] * cos + rise.slope[1] * sin);
+    let slope_across = (front_left + hind_left - front_right - hind_right) / (4.0 * across)
+        + (rise.slope[1] * cos - rise.slope[0] * sin);
+    let height = (front_left + front_right + hind_left + hind_right) / 4.0 + rise.height;
+    // The plane's normal and its x axis, in a frame that only follows the heading.
+    let forward = Vector3::new(1.0, 0.0, slope_along).normalize();
+    let up = Vector3::new(-slope_along, -slope_across, 1.0).normalize();
+    let left = up.cross(&forward);
+    let forward = left.cross(&up);
+    let tilt = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[forward, left, up]));
+    Pose::from_parts(
+        Translation3::new(x, y, height),
+        Rotation::from_axis_angle(&Vector3::z_axis(), heading)
+            * Rotation::from_rotation_matrix(&tilt),
+    )
 }
 
 #[cfg(test)]

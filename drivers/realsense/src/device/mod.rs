@@ -13,6 +13,8 @@ mod link;
 mod session;
 mod setup;
 mod times;
+#[cfg(all(feature = "v4l2", target_os = "linux", target_pointer_width = "64"))]
+pub mod v4l2;
 
 use std::string::String;
 
@@ -29,6 +31,7 @@ pub use link::{
 };
 pub use session::CameraIdentity;
 use session::Session;
+pub use setup::read as identify;
 use times::Exposed;
 
 /// A camera that sends nothing for this long is opened anew, ns. The slowest streams have a frame

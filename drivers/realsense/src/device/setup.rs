@@ -21,10 +21,11 @@ const EXPOSURE_APERTURE_PRIORITY: i32 = 3;
 /// The unit of the second, µs.
 const EXPOSURE_UNIT_US: u32 = 100;
 
-/// What the camera is and where its pixels look.
-pub(super) fn read(
-    link: &mut impl CameraLink,
-) -> Result<(CameraIdentity, RgbdGeometry), CameraError> {
+/// What an open camera is and where the pixels of its streams look. Nothing streams for that.
+///
+/// # Errors
+/// The firmware does not answer, or the calibration cannot be used.
+pub fn read(link: &mut impl CameraLink) -> Result<(CameraIdentity, RgbdGeometry), CameraError> {
     let mut buffer = [0; MONITOR_LEN];
     let info = DeviceInfo::decode(ask(link, &Command::DEVICE_INFO, &mut buffer)?)?;
     let table = Command::calibration(DepthCalibration::TABLE);

@@ -85,7 +85,8 @@ impl KinematicBody {
         };
     }
 
-    fn height_m(&self) -> f64 {
+    /// Height of the base over the ground, m.
+    pub fn height_m(&self) -> f64 {
         self.standing_m * (LYING_SHARE + (1.0 - LYING_SHARE) * self.risen)
     }
 }

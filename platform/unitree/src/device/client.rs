@@ -8,15 +8,16 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-use hachi_datagram::{SystemClock, UdpConfig, UdpSource};
+use hachi_datagram::SystemClock;
 use hachi_hal::{
-    BaseCommand, BaseDrive, BaseStatus, Battery, BatterySample, Clock, EmergencyStop, Imu,
-    ImuSample, LegState, LegStates, PacketSource, Stamp, StopSample,
+    BaseCommand, BaseDrive, BaseStatus, Battery, BatterySample, EmergencyStop, Imu, ImuSample,
+    LegState, LegStates, Stamp, StopSample,
 };
 use heapless::Deque;
 
 use super::counters::ClientCounters;
 use super::error::ClientError;
+use super::link::{RobotLink, UdpLink};
 use crate::command::{Commander, CommanderConfig, Rung};
 use crate::frame::{
     CheckForm, FieldError, FrameError, HighState, Key, Keys, LONGEST_FRAME, Remote,
@@ -72,15 +73,17 @@ const HELLO_PERIOD_NS: i64 = 100_000_000;
 /// Samples that wait to be fetched: a tenth of a second at the highest rate.
 const WAITING: usize = 64;
 
+/// Frames taken in after the deadline: whoever floods the port does not keep us here.
+const MOST_OVERTIME: usize = 256;
+
 type Waiting<T> = Deque<T, WAITING>;
 
-/// A robot's high-level service.
+/// A robot's high-level service, over any link.
 #[derive(Debug)]
-pub struct HighClient {
+pub struct HighClient<L = UdpLink> {
     robot: Quadruped,
     config: ClientConfig,
-    link: UdpSource,
-    clock: SystemClock,
+    link: L,
     commander: Commander,
     sent_at: Option<Stamp>,
     watch: ContentWatch,
@@ -106,15 +109,32 @@ impl HighClient {
         config: ClientConfig,
         clock: SystemClock,
     ) -> Result<Self, ClientError> {
-        let udp = UdpConfig {
-            bind_address: config.local_address,
-            source_address: Some(config.robot.ip()),
-            ..UdpConfig::on_ports(&[config.local_port])
-        };
+        let local = (config.local_address, config.local_port);
+        let link = UdpLink::open(config.robot, local, clock)?;
+        Self::over(robot, config, link)
+    }
+
+    /// Datagrams from other senders than the robot, left out.
+    pub fn foreign_senders(&self) -> u64 {
+        self.link.source.counters().foreign_sender
+    }
+
+    /// The port that the robot answers at.
+    pub fn local_port(&self) -> u16 {
+        let ports = self.link.source.local_ports();
+        ports.first().copied().unwrap_or(0)
+    }
+}
+
+impl<L: RobotLink> HighClient<L> {
+    /// The service over a link that is there already.
+    ///
+    /// # Errors
+    /// The robot has no such gait.
+    pub fn over(robot: &Quadruped, config: ClientConfig, link: L) -> Result<Self, ClientError> {
         Ok(Self {
             robot: *robot,
-            link: UdpSource::open(&udp, clock)?,
-            clock,
+            link,
             commander: Commander::new(robot, config.commander)?,
             config,
             sent_at: None,
@@ -133,13 +153,17 @@ impl HighClient {
     }
 
     /// Sends what is due and takes in what comes, until a new state is there or `deadline` has
-    /// passed. Whether a new state came.
+    /// passed and nothing waits any more. Whether a new state came.
+    ///
+    /// Frames that only repeat the last one are taken in on the way: a robot sends ten for each new
+    /// one, and a caller that does not wait must not fall behind.
     ///
     /// # Errors
     /// The socket fails; call again, or open anew, as its kind says.
     pub fn exchange(&mut self, deadline: Stamp) -> Result<bool, ClientError> {
-        loop {
-            let now = self.clock.now();
+        let mut overtime = 0;
+        while overtime < MOST_OVERTIME {
+            let now = self.link.now();
             let due = self.next_sending(now);
             if due <= now {
                 self.send(now)?;
@@ -153,15 +177,15 @@ impl HighClient {
                         return Ok(true);
                     }
                 }
+                Ok(None) if self.link.now() >= deadline => return Ok(false),
                 Ok(None) => {}
                 // Longer than any frame: some other program's.
                 Err(hachi_datagram::UdpError::Oversize { .. }) => self.counters.wrong_length += 1,
                 Err(error) => return Err(error.into()),
             }
-            if self.clock.now() >= deadline {
-                return Ok(false);
-            }
+            overtime += usize::from(self.link.now() >= deadline);
         }
+        Ok(false)
     }
 
     fn next_sending(&self, now: Stamp) -> Stamp {
@@ -182,7 +206,7 @@ impl HighClient {
             .command
             .encode(&self.robot.layout, self.commander.check_form())?;
         self.sent_at = Some(now);
-        self.link.send(frame.as_bytes(), self.config.robot)?;
+        self.link.send(frame.as_bytes())?;
         self.counters.sent += 1;
         Ok(told.status)
     }
@@ -261,6 +285,25 @@ impl HighClient {
         }
     }
 
+    /// Samples of legs and body together that have come, one after the other; does not listen.
+    pub fn next_body(&mut self) -> Option<BodySample> {
+        self.bodies.pop_front()
+    }
+
+    /// The last of the emergency stop's reports that have come; does not listen.
+    pub fn last_stop(&mut self) -> Option<StopSample> {
+        let last = self.stops.pop_back();
+        self.stops.clear();
+        last
+    }
+
+    /// The last of the battery's reports that have come; does not listen.
+    pub fn last_battery(&mut self) -> Option<BatterySample> {
+        let last = self.batteries.pop_back();
+        self.batteries.clear();
+        last
+    }
+
     /// The next sample of legs and body together; waits until `deadline`.
     ///
     /// # Errors
@@ -318,19 +361,9 @@ impl HighClient {
         &self.counters
     }
 
-    /// Datagrams from other senders than the robot, left out.
-    pub fn foreign_senders(&self) -> u64 {
-        self.link.counters().foreign_sender
-    }
-
     /// Why the last refused frame was refused, and the last ill value was ill.
     pub fn last_refusals(&self) -> (Option<FrameError>, Option<FieldError>) {
         (self.last_refusal, self.last_ill)
-    }
-
-    /// The port that the robot answers at.
-    pub fn local_port(&self) -> u16 {
-        self.link.local_ports().first().copied().unwrap_or(0)
     }
 }
 
@@ -344,7 +377,7 @@ fn push<T>(queue: &mut Waiting<T>, sample: T, counters: &mut ClientCounters) {
     let _ = queue.push_back(sample);
 }
 
-impl BaseDrive for HighClient {
+impl<L: RobotLink> BaseDrive for HighClient<L> {
     type Error = ClientError;
 
     fn command(&mut self, command: &BaseCommand, now: Stamp) -> Result<(), ClientError> {
@@ -367,7 +400,7 @@ impl BaseDrive for HighClient {
     }
 }
 
-impl LegStates for HighClient {
+impl<L: RobotLink> LegStates for HighClient<L> {
     type Error = ClientError;
 
     fn read_legs(&mut self, deadline: Stamp) -> Result<Option<LegState>, ClientError> {
@@ -375,7 +408,7 @@ impl LegStates for HighClient {
     }
 }
 
-impl Imu for HighClient {
+impl<L: RobotLink> Imu for HighClient<L> {
     type Error = ClientError;
 
     fn read(&mut self, deadline: Stamp) -> Result<Option<ImuSample>, ClientError> {
@@ -383,7 +416,7 @@ impl Imu for HighClient {
     }
 }
 
-impl Battery for HighClient {
+impl<L: RobotLink> Battery for HighClient<L> {
     type Error = ClientError;
 
     fn read_battery(&mut self, deadline: Stamp) -> Result<Option<BatterySample>, ClientError> {
@@ -391,7 +424,7 @@ impl Battery for HighClient {
     }
 }
 
-impl EmergencyStop for HighClient {
+impl<L: RobotLink> EmergencyStop for HighClient<L> {
     type Error = ClientError;
 
     fn read_stop(&mut self, deadline: Stamp) -> Result<Option<StopSample>, ClientError> {

@@ -63,21 +63,18 @@ pub struct SimulatedCounters {
     pub refused: u64,
     /// States sent.
     pub states: u64,
-    /// States that could not be sent.
+    /// Of these, lost on the way out.
     pub unsent: u64,
     /// Times that the commands stopped coming.
     pub stale: u64,
 }
 
-/// A simulated robot. It has no thread and no clock: whoever owns it calls [`Self::step`].
+/// What a simulated robot does with frames, whatever carries them. It has no thread and no clock.
 #[derive(Debug)]
-pub struct SimulatedRobot<B> {
+pub struct SimulatedService<B> {
     layout: Layout,
     config: SimulatedRobotConfig,
-    socket: UdpSocket,
-    address: SocketAddr,
     body: B,
-    peer: Option<SocketAddr>,
     command: HighCmd,
     heard: Option<Stamp>,
     is_stale: bool,
@@ -88,24 +85,13 @@ pub struct SimulatedRobot<B> {
     counters: SimulatedCounters,
 }
 
-/// Commands taken in at one step; more stay in the socket.
-const MOST_AT_ONCE: usize = 64;
-
-impl<B: RobotBody> SimulatedRobot<B> {
-    /// Opens the robot's port.
-    ///
-    /// # Errors
-    /// The port is taken.
-    pub fn open(layout: &Layout, body: B, config: SimulatedRobotConfig) -> io::Result<Self> {
-        let socket = UdpSocket::bind(config.bind)?;
-        socket.set_nonblocking(true)?;
-        Ok(Self {
+impl<B: RobotBody> SimulatedService<B> {
+    /// A robot that nobody has spoken to yet.
+    pub fn new(layout: &Layout, body: B, config: SimulatedRobotConfig) -> Self {
+        Self {
             layout: *layout,
-            address: socket.local_addr()?,
-            socket,
             body,
             config,
-            peer: None,
             command: HighCmd::default(),
             heard: None,
             is_stale: false,
@@ -114,20 +100,28 @@ impl<B: RobotBody> SimulatedRobot<B> {
             sent: None,
             frame: None,
             counters: SimulatedCounters::default(),
-        })
+        }
     }
 
-    /// Where it is spoken to.
-    pub fn address(&self) -> SocketAddr {
-        self.address
+    /// Takes in a datagram; whether it was a whole command.
+    pub fn hear(&mut self, bytes: &[u8], now: Stamp) -> bool {
+        match HighCmd::decode(&self.layout, bytes) {
+            Ok((command, _)) if command.check_finite().is_ok() => {
+                self.counters.commands += 1;
+                self.command = command;
+                self.heard = Some(now);
+                self.is_stale = false;
+                true
+            }
+            _ => {
+                self.counters.refused += 1;
+                false
+            }
+        }
     }
 
-    /// Takes in what was sent, moves the body on to `now`, and answers if it is time.
-    ///
-    /// # Errors
-    /// The socket can't be read any more.
-    pub fn step(&mut self, now: Stamp) -> io::Result<()> {
-        self.listen(now)?;
+    /// Moves the body on to `now`; the state that is due to whoever has spoken.
+    pub fn step(&mut self, now: Stamp) -> Option<&Frame> {
         let dt_s = self.stepped.map_or(0.0, |last| now.secs_since(last));
         self.stepped = Some(now);
         let command = self.in_force(now);
@@ -135,48 +129,19 @@ impl<B: RobotBody> SimulatedRobot<B> {
         let due = |last: Option<Stamp>, period: i64| {
             last.is_none_or(|last| now.nanos_since(last) >= period)
         };
-        let Some(peer) = self.peer else {
-            return Ok(());
-        };
+        self.heard?;
         if due(self.refreshed, self.config.refresh_ns) {
             let mut state = HighState::of(&self.layout);
             self.body.fill(&mut state);
             self.frame = Some(state.encode(self.config.check_form));
             self.refreshed = Some(now);
         }
-        if let Some(frame) = self
-            .frame
-            .filter(|_| due(self.sent, self.config.state_period_ns))
-        {
-            self.send(&frame, peer);
-            self.sent = Some(now);
+        if !due(self.sent, self.config.state_period_ns) {
+            return None;
         }
-        Ok(())
-    }
-
-    fn listen(&mut self, now: Stamp) -> io::Result<()> {
-        for _ in 0..MOST_AT_ONCE {
-            let mut buffer = [0; LONGEST_FRAME + 1];
-            match self.socket.recv_from(&mut buffer) {
-                Ok((len, peer)) => match HighCmd::decode(&self.layout, &buffer[..len]) {
-                    Ok((command, _)) if command.check_finite().is_ok() => {
-                        self.counters.commands += 1;
-                        self.command = command;
-                        self.heard = Some(now);
-                        self.is_stale = false;
-                        self.peer = Some(peer);
-                    }
-                    _ => self.counters.refused += 1,
-                },
-                Err(error) => match error.kind() {
-                    io::ErrorKind::WouldBlock => break,
-                    // Somebody who was answered is no longer there.
-                    io::ErrorKind::Interrupted | io::ErrorKind::ConnectionRefused => {}
-                    _ => return Err(error),
-                },
-            }
-        }
-        Ok(())
+        self.sent = Some(now);
+        self.counters.states += 1;
+        self.frame.as_ref()
     }
 
     /// The last command; standing still where it is too old.
@@ -191,21 +156,6 @@ impl<B: RobotBody> SimulatedRobot<B> {
             (command.velocity, command.yaw_speed) = ([0.0; 2], 0.0);
         }
         command
-    }
-
-    fn send(&mut self, frame: &Frame, peer: SocketAddr) {
-        match self.socket.send_to(frame.as_bytes(), peer) {
-            Ok(_) => self.counters.states += 1,
-            // As on a wire: nobody hears of it.
-            Err(_) => self.counters.unsent += 1,
-        }
-    }
-
-    /// Sends a datagram of one's own making to whoever spoke last: faults for tests. Whether there
-    /// was anybody.
-    pub fn inject(&mut self, bytes: &[u8]) -> bool {
-        self.peer
-            .is_some_and(|peer| self.socket.send_to(bytes, peer).is_ok())
     }
 
     /// The last whole command.
@@ -226,5 +176,102 @@ impl<B: RobotBody> SimulatedRobot<B> {
     /// What happened so far.
     pub fn counters(&self) -> SimulatedCounters {
         self.counters
+    }
+}
+
+/// A simulated robot behind a UDP port. It has no thread and no clock: whoever owns it calls
+/// [`Self::step`].
+#[derive(Debug)]
+pub struct SimulatedRobot<B> {
+    service: SimulatedService<B>,
+    socket: UdpSocket,
+    address: SocketAddr,
+    peer: Option<SocketAddr>,
+}
+
+/// Commands taken in at one step; more stay in the socket.
+const MOST_AT_ONCE: usize = 64;
+
+impl<B: RobotBody> SimulatedRobot<B> {
+    /// Opens the robot's port.
+    ///
+    /// # Errors
+    /// The port is taken.
+    pub fn open(layout: &Layout, body: B, config: SimulatedRobotConfig) -> io::Result<Self> {
+        let socket = UdpSocket::bind(config.bind)?;
+        socket.set_nonblocking(true)?;
+        Ok(Self {
+            service: SimulatedService::new(layout, body, config),
+            address: socket.local_addr()?,
+            socket,
+            peer: None,
+        })
+    }
+
+    /// Where it is spoken to.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Takes in what was sent, moves the body on to `now`, and answers if it is time.
+    ///
+    /// # Errors
+    /// The socket can't be read any more.
+    pub fn step(&mut self, now: Stamp) -> io::Result<()> {
+        self.listen(now)?;
+        let frame = self.service.step(now);
+        if let (Some(frame), Some(peer)) = (frame, self.peer) {
+            // As on a wire: nobody hears of what is lost.
+            let unsent = self.socket.send_to(frame.as_bytes(), peer).is_err();
+            self.service.counters.unsent += u64::from(unsent);
+        }
+        Ok(())
+    }
+
+    fn listen(&mut self, now: Stamp) -> io::Result<()> {
+        for _ in 0..MOST_AT_ONCE {
+            let mut buffer = [0; LONGEST_FRAME + 1];
+            match self.socket.recv_from(&mut buffer) {
+                Ok((len, peer)) => {
+                    if self.service.hear(&buffer[..len], now) {
+                        self.peer = Some(peer);
+                    }
+                }
+                Err(error) => match error.kind() {
+                    io::ErrorKind::WouldBlock => break,
+                    // Somebody who was answered is no longer there.
+                    io::ErrorKind::Interrupted | io::ErrorKind::ConnectionRefused => {}
+                    _ => return Err(error),
+                },
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends a datagram of one's own making to whoever spoke last: faults for tests. Whether there
+    /// was anybody.
+    pub fn inject(&mut self, bytes: &[u8]) -> bool {
+        self.peer
+            .is_some_and(|peer| self.socket.send_to(bytes, peer).is_ok())
+    }
+
+    /// The last whole command.
+    pub fn command(&self) -> &HighCmd {
+        self.service.command()
+    }
+
+    /// The body.
+    pub fn body(&self) -> &B {
+        self.service.body()
+    }
+
+    /// The body, to push it about.
+    pub fn body_mut(&mut self) -> &mut B {
+        self.service.body_mut()
+    }
+
+    /// What happened so far.
+    pub fn counters(&self) -> SimulatedCounters {
+        self.service.counters()
     }
 }

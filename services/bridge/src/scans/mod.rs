@@ -7,7 +7,12 @@
 //! A scan's stamp, the time of its last point, comes from the first of these that is there: a line
 //! of `times.txt`; the points' own UNIX times; names that are UNIX nanoseconds; 0.1 s after the
 //! scan before, from zero.
+//!
+//! The clouds of a KITTI sequence, recognised by `velodyne/` and the `Tr` of its `calib.txt`, are
+//! corrected for the vertical angles of its LiDAR (`hdl64`). Scans in any other folder, KITTI's too, come
+//! as they are.
 
+mod hdl64;
 pub(crate) mod names;
 mod times;
 
@@ -139,6 +144,13 @@ impl ScanFiles {
         self.camera_from_lidar.as_ref()
     }
 
+    /// Whether the points are raised by 0.205 degrees: KITTI's calibration of its HDL-64 has its
+    /// vertical angles too low by so much. Done for a sequence with a `calib.txt`, and not for bare
+    /// folders of scans, which may come from any sensor.
+    pub fn corrects_vertical_angles(&self) -> bool {
+        self.camera_from_lidar.is_some()
+    }
+
     /// What intensities are multiplied by: 1 or 255, `None` before a scan has settled it.
     pub fn intensity_scale(&self) -> Option<f32> {
         self.decoder.intensity_scale()
@@ -170,6 +182,9 @@ impl ScanFiles {
                 source,
             },
         )?;
+        if self.corrects_vertical_angles() {
+            hdl64::raise(points);
+        }
         let given = self.times.as_ref().and_then(|times| times.get(place));
         let header = self.header(place, given.copied(), info.times);
         self.sequence = self.sequence.wrapping_add(1);

@@ -15,10 +15,10 @@ Writes map.ply, trajectory.svg, trajectory.tum, odometry.tum and report.json to 
 Example:
   hachi demo --seconds 30 --out out/demo")]
 pub struct DemoArguments {
-    /// How long the robot walks, seconds of its own time.
+    /// How long the robot walks, seconds of its own time: the clock is virtual.
     #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = super::seconds)]
     pub seconds: f64,
-    /// Open no window and no address: only write files and the summary.
+    /// Show no task table: only write files and the summary.
     #[arg(long)]
     pub headless: bool,
     /// The building, the walk and the noise: the same number gives the same bytes.
@@ -29,9 +29,19 @@ pub struct DemoArguments {
     /// on rolling ground, 2.5 km in 21 minutes) or campus-long (20 km at 4 m/s).
     #[arg(long, value_name = "NAME", default_value = "office", value_parser = world)]
     pub world: Preset,
+    /// The robot that the service drives: b1 or go1.
+    #[arg(long, value_name = "NAME", default_value = "b1")]
+    pub platform: String,
+    /// The robot follows a fixed walk and nobody drives it; always so in the worlds stress and
+    /// campus-long, and with --stage odometry.
+    #[arg(long)]
+    pub scripted: bool,
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
     pub stage: StageArgument,
+    /// Keep the map in this file, or go on with the one that is there.
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
     /// What it carries: vlp16, vlp16-dual or helios16p.
     #[arg(long, value_name = "NAME", default_value = "vlp16", value_parser = sensor)]
     pub sensor: SensorKind,
@@ -84,7 +94,8 @@ pub enum CloudFormat {
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 INPUT is a pcap or pcapng capture, a ROS 2 bag (db3, mcap), a ROS 1 bag, a KITTI sequence folder, or a \
-folder of .bin, .pcd or .ply scans in numeric order with optional times.txt (seconds).
+folder of .bin, .pcd or .ply scans in numeric order with optional times.txt (seconds). In a KITTI \
+sequence with its calib.txt the LiDAR's vertical angles are corrected by 0.205 degrees, as is usual.
 
 Example:
   hachi replay drive.pcap --out out/drive --stage slam --map drive.map")]
@@ -176,7 +187,7 @@ pub struct EvalRegistrationArguments {
     pub json: bool,
 }
 
-fn world(name: &str) -> Result<Preset, String> {
+pub(super) fn world(name: &str) -> Result<Preset, String> {
     Preset::from_name(name).ok_or_else(|| {
         let names = Preset::ALL.map(Preset::name).join(", ");
         format!("there is no such world; choose one of {names}")

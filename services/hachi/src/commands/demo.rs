@@ -1,25 +1,24 @@
-//! `hachi demo`: the simulated robot through the whole pipeline, compared with the truth.
+//! `hachi demo`: the whole service drives a simulated robot; what it made of that, compared with the
+//! truth.
 
-use hachi_bridge::message::Sensor;
-use hachi_slam::{MemoryStore, Slam};
+mod driven;
+mod scripted;
+
+use hachi_hal::Vector3;
 use hachi_trajectory::plot::Plot;
 use hachi_trajectory::{Alignment, Evaluation, EvaluationOptions, Trajectory, evaluate};
-use hachi_world::{SensorKind, SimulatedLidar, Simulation, SimulationConfig};
+use hachi_world::{Preset, SensorKind};
 use serde::Serialize;
 
+use super::replay::{first_failure, thread_pool};
 use crate::cli::mapping::{DemoArguments, StageArgument};
-use crate::config::MappingConfig;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
-use crate::mapping::{Ended, Mapping, run as run_mapping, state_of};
-use crate::motion_samples::MotionSamples;
-use crate::recording::from_packets;
+use crate::map_builder::MapBuilder;
+use crate::mapping::{Ended, state_of};
+use crate::output;
 use crate::report::{Report, RunState};
 use crate::results::Results;
-use crate::slam_stage::SlamStage;
-use crate::{output, progress};
-
-use super::replay::{first_failure, thread_pool};
 
 /// The VLP-16 turns ten times a second.
 const SCANS_PER_SECOND: f64 = 10.0;
@@ -42,6 +41,23 @@ struct DemoReport {
     /// Error of the height, metres.
     z_rmse_m: f64,
     true_path_length_m: f64,
+    /// The robot that the service drove; absent where it followed a fixed walk.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robot: Option<&'static str>,
+}
+
+/// What a walk left.
+struct Walked {
+    trajectory: Trajectory,
+    odometry: Trajectory,
+    truth: Trajectory,
+    map: MapBuilder,
+    loop_lines: Vec<(Vector3, Vector3)>,
+    /// The ledger as a table.
+    loops: String,
+    report: Report,
+    ended: Ended,
+    robot: Option<&'static str>,
 }
 
 /// Runs the command.
@@ -49,57 +65,21 @@ struct DemoReport {
 /// # Errors
 /// A file can't be written, or the user stopped it: then what was done is written all the same.
 pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
-    let mut world = SimulationConfig::preset(arguments.world, arguments.seed, arguments.seconds);
-    world.sensor = arguments.sensor;
     let results = Results::create(&arguments.out)?;
     let cancelled = Cancelled::on_interrupt()?;
-    let bar = progress::bar(Some((arguments.seconds * SCANS_PER_SECOND) as u64), "scans");
-    let mut config = MappingConfig::default();
-    if let Some(filter) = arguments.filter {
-        filter.apply(&mut config.filter);
-    }
-    let driver = match arguments.sensor {
-        SensorKind::Helios16P => Sensor::Robosense,
-        _ => Sensor::Velodyne,
+    let mut walked = match is_driven(arguments) {
+        true => thread_pool(None)?.install(|| driven::walk(arguments, &results, &cancelled))?,
+        false => scripted::walk(arguments, &results, &cancelled)?,
     };
-    let lidar = SimulatedLidar::new(Simulation::new(world.clone()));
-    let mut source = from_packets(driver, lidar, |_| Vec::new());
-    let slam_config = config.slam.clone();
-    let mut mapping = Mapping::new(config, results.folder())?;
-    if arguments.stage == StageArgument::Slam {
-        let store = Box::new(MemoryStore::default());
-        mapping = mapping.with_slam(Slam::new(slam_config, store));
-    }
-
-    let pool = thread_pool(None)?;
-    let (ended, finished, mut report) = pool.install(|| {
-        let mut motion = MotionSamples::default();
-        let ended = run_mapping(
-            &mut mapping,
-            &mut *source,
-            &mut motion,
-            &cancelled,
-            &bar,
-            |_, _, _| (),
-        );
-        let finished = mapping.finish();
-        (ended, finished, mapping.report())
-    });
-    bar.finish_and_clear();
-    finished?;
-    for (reason, count) in source.dropped() {
-        report.drop_for(&reason, count);
-    }
-    report.state = state_of(&ended);
-
-    let truth = truth_at(mapping.trajectory(), &world);
-    let measured = match measure(&truth, mapping.trajectory()) {
+    walked.report.state = state_of(&walked.ended);
+    let measured = match measure(&walked.truth, &walked.trajectory) {
         Ok(measured) => measured,
         // Stopped before there was anything to write.
-        Err(_) if matches!(ended, Ended::Interrupted) => return Err(interrupted(0)),
+        Err(_) if matches!(walked.ended, Ended::Interrupted) => return Err(interrupted(0)),
         Err(failure) => return Err(failure),
     };
-    let written = write_all(&results, &mapping, &truth, &measured);
+    let written = write_all(&results, &walked, &measured);
+    let mut report = walked.report;
     if written.is_err() {
         report.state = RunState::OutputFailed;
     }
@@ -113,10 +93,11 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         seed: arguments.seed,
         ate_rmse_m: measured.ape.rmse,
         ate_max_m: measured.ape.max,
-        odometry_ate_rmse_m: measure(&truth, &mapping.odometry()).map_or(0.0, |e| e.ape.rmse),
+        odometry_ate_rmse_m: measure(&walked.truth, &walked.odometry).map_or(0.0, |e| e.ape.rmse),
         rpe_rmse_m: measured.rpe.map_or(0.0, |rpe| rpe.rmse),
         z_rmse_m: height_error(&measured),
-        true_path_length_m: truth.path_length_m(),
+        true_path_length_m: walked.truth.path_length_m(),
+        robot: walked.robot,
         report,
     };
     written.and(crate::report::write_json(
@@ -126,32 +107,24 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     if arguments.json {
         output::json(&report)?;
     } else {
-        output::text(&summary(&report, &mapping, &results))?;
+        output::text(&summary(&report, walked.map.len(), &results))?;
     }
-    match ended {
+    match walked.ended {
         Ended::Finished => Ok(()),
         Ended::Unreadable(failure) => Err(failure),
         Ended::Interrupted => Err(interrupted(report.report.scans)),
     }
 }
 
-fn interrupted(scans: u64) -> Failure {
-    Failure::Interrupted(format!("{scans} scans were processed and written"))
+/// Whether the service drives. A hand that carries a sensor in a hurry, and a robot on wheels at
+/// 4 m/s, are none of its robots; and without SLAM it has no map to find its places on.
+fn is_driven(arguments: &DemoArguments) -> bool {
+    let walks = !matches!(arguments.world, Preset::Stress | Preset::CampusLong);
+    walks && !arguments.scripted && arguments.stage == StageArgument::Slam
 }
 
-/// The true poses at the trajectory's times, in its map frame: the first scan's.
-fn truth_at(trajectory: &Trajectory, world: &SimulationConfig) -> Trajectory {
-    let stamps = trajectory.stamps().unwrap_or_default();
-    let mut truth = Trajectory::new();
-    let Some(first) = stamps.first() else {
-        return truth;
-    };
-    let origin = world.map_from_lidar(*first).inverse();
-    for stamp in stamps {
-        // The trajectory's own stamps increase, so none is refused.
-        let _ = truth.push(*stamp, origin * world.map_from_lidar(*stamp));
-    }
-    truth
+fn interrupted(scans: u64) -> Failure {
+    Failure::Interrupted(format!("{scans} scans were processed and written"))
 }
 
 fn measure(truth: &Trajectory, estimate: &Trajectory) -> Result<Evaluation, Failure> {
@@ -178,47 +151,45 @@ fn height_error(measured: &Evaluation) -> f64 {
     (squares.sum::<f64>() / measured.estimate.len().max(1) as f64).sqrt()
 }
 
-fn write_all(
-    results: &Results,
-    mapping: &Mapping,
-    truth: &Trajectory,
-    measured: &Evaluation,
-) -> Result<(), Failure> {
-    let trajectory = mapping.trajectory();
+fn write_all(results: &Results, walked: &Walked, measured: &Evaluation) -> Result<(), Failure> {
+    let trajectory = &walked.trajectory;
     let subtitle = format!(
         "{} scans, {:.1} m, error {:.1} cm (rmse)",
         trajectory.len(),
-        truth.path_length_m(),
+        walked.truth.path_length_m(),
         measured.ape.rmse * 100.0
     );
-    let loops = mapping.slam().map_or_else(Vec::new, SlamStage::loop_lines);
     let picture = Plot {
         title: "Simulated building: estimate and truth",
         subtitle: &subtitle,
         estimate: &measured.estimate,
         reference: Some(&measured.reference),
         errors_m: Some(&measured.errors_m),
-        links: &loops,
+        links: &walked.loop_lines,
     };
     first_failure([
         results.trajectory("trajectory.tum", trajectory),
-        results.trajectory("odometry.tum", &mapping.odometry()),
-        results.trajectory("truth.tum", truth),
+        results.trajectory("odometry.tum", &walked.odometry),
+        results.trajectory("truth.tum", &walked.truth),
         results.picture(&picture),
-        results.map(mapping.map(), trajectory),
-        results.loops(mapping.slam()),
+        results.map(&walked.map, trajectory),
+        results.write("loops.csv", walked.loops.as_bytes()),
     ])
 }
 
-fn summary(demo: &DemoReport, mapping: &Mapping, results: &Results) -> String {
+fn summary(demo: &DemoReport, map_points: usize, results: &Results) -> String {
     let report = &demo.report;
     let times = &report.total_per_scan_ms;
+    let robot = match demo.robot {
+        Some(robot) => format!("a {robot} driven by the service"),
+        None => "a walking robot".to_owned(),
+    };
     format!(
-        "{} on a walking robot, {} building {}: {} scans, {:.1} s, {:.1} m\n\
+        "{} on {robot}, {} building {}: {} scans, {:.1} s, {:.1} m\n\
          error against the truth {:.1} cm rmse, {:.1} cm at most; {:.1} cm rmse by odometry alone\n\
          {:.1} ms a scan in the mean, {:.1} ms at the 99th percentile, {} threads\n\
          condition OK {}, DEGRADED {}, LOST {}; {} of {} loop candidates closed\n\
-         look at {} and {} ({} points)",
+         look at {} and {} ({map_points} points)",
         demo.sensor,
         demo.world,
         demo.seed,
@@ -238,6 +209,5 @@ fn summary(demo: &DemoReport, mapping: &Mapping, results: &Results) -> String {
         report.loops.candidates,
         results.path("trajectory.svg").display(),
         results.path("map.ply").display(),
-        mapping.map().len(),
     )
 }

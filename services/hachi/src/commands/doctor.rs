@@ -4,6 +4,8 @@
 //! finding fails only if live LiDAR mapping would not work; what other parts need, or what only
 //! costs speed, is a warning. Where a system does not say (no `/proc`), that is said.
 
+#[cfg(all(target_os = "linux", target_pointer_width = "64"))]
+mod cameras;
 mod devices;
 mod files;
 mod finding;
@@ -52,6 +54,8 @@ impl Examination {
             realtime::check(),
             network::check(),
             devices::check(),
+            #[cfg(all(target_os = "linux", target_pointer_width = "64"))]
+            cameras::check(),
             files::check(),
         ])
     }

@@ -33,7 +33,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     let bar = progress::bar(source.scan_count(), "scans");
     let slam = match arguments.stage {
         StageArgument::Odometry => None,
-        StageArgument::Slam => Some(slam(arguments, &config)?),
+        StageArgument::Slam => Some(slam(
+            arguments.map.as_deref(),
+            arguments.platform.as_deref(),
+            &config,
+        )?),
     };
     let mut mapping = Mapping::new(config, results.folder())?;
     if let Some(slam) = slam {
@@ -70,12 +74,19 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
 }
 
 /// SLAM, with a map in memory or in the file that the user named: begun there, or gone on with.
-fn slam(arguments: &ReplayArguments, config: &MappingConfig) -> Result<Slam, Failure> {
+///
+/// # Errors
+/// The file is no map, damaged, in use, of another robot, or can't be written.
+pub fn slam(
+    map: Option<&Path>,
+    platform: Option<&str>,
+    config: &MappingConfig,
+) -> Result<Slam, Failure> {
     let settings = config.slam.clone();
-    let Some(path) = &arguments.map else {
+    let Some(path) = map else {
         return Ok(Slam::new(settings, Box::new(MemoryStore::default())));
     };
-    let (file, saved) = saved_maps::go_on(path, arguments.platform.as_deref())?;
+    let (file, saved) = saved_maps::go_on(path, platform)?;
     Slam::resume(settings, saved, Box::new(file))
         .map_err(|error| Failure::new(error, "restore the map from a copy, or map anew"))
 }

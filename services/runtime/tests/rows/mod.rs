@@ -15,6 +15,7 @@ pub fn by_period(name: &'static str, period_ms: i64, priority: u8) -> TaskSpec {
         budget_ns: period_ms * MS / 2,
         priority,
         core: None,
+        parallel: false,
         overrun: Overrun::Skip,
         hard: true,
         ladder: &[],

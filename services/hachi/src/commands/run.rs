@@ -1,0 +1,265 @@
+//! `hachi run`: the service on a robot.
+//!
+//! From the settings to the devices, from the devices to the tasks, then waiting for the end: the
+//! calling thread watches the watchdog, tells systemd, and looks whether to stop. Settings that
+//! can't be worked with do not end the program: nobody moves the robot, and the file is read again
+//! when it changes.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+use hachi_bridge::message::Sensor;
+use hachi_datagram::{SystemClock, UdpConfig, UdpSource};
+use hachi_hal::Stamp;
+use hachi_runtime::executor::threads::{self, ThreadsConfig};
+use hachi_runtime::notify::Notifier;
+use hachi_runtime::{Health, SoftWatchdog, TaskClock, Telemetry, Trouble};
+use hachi_unitree::command::CommanderConfig;
+use hachi_unitree::device::{HighClient, StopLine};
+use tracing::{error, info, warn};
+
+use super::replay::slam;
+use super::simulate::platform_of;
+use crate::cli::service::RunArguments;
+use crate::config::Settings;
+use crate::exit::Failure;
+use crate::interrupt::Cancelled;
+use crate::service::settings::{LidarKind, Platform};
+use crate::service::signs::SharedSigns;
+use crate::service::web::{self, Page};
+use crate::service::wiring::{Devices, Running, Service, assemble};
+
+/// Runs the command.
+///
+/// # Errors
+/// A device or the map can't be opened, or a task ended that should not have.
+pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
+    let cancelled = Cancelled::on_interrupt()?;
+    let mut notifier = Notifier::default();
+    let (settings, platform) = settings_in_the_end(&arguments.config, &cancelled, &mut notifier)?;
+    let clock = SystemClock::new();
+    let config = platform.client(&settings.robot);
+    let stop_line = stop_line(&platform, config.robot)?;
+    let devices = Devices {
+        platform,
+        client: HighClient::open(platform.robot, config, clock)
+            .map_err(|error| unopened("the robot", &error, "robot.local_port"))?,
+        packets: UdpSource::open(&udp_of(&settings), clock)
+            .map_err(|error| unopened("the lidar", &error, "lidar.ports"))?,
+        sensor: match settings.lidar.kind {
+            LidarKind::Vlp16 => Sensor::Velodyne,
+            LidarKind::Helios16p => Sensor::Robosense,
+        },
+    };
+    let listen = settings.service.listen;
+    let listener = web::listen(listen)
+        .map_err(|error| unopened(&format!("http at {listen}"), &error, "service.listen"))?;
+    let map = settings.service.map.as_deref();
+    let slam = slam(map, settings.robot.platform.as_deref(), &settings.mapping())?;
+    let running = Running::Threads(settings.service.threads);
+    let service = assemble(&settings, devices, slam, TaskClock::new(clock), running)?;
+    info!(
+        robot = platform.robot.name(),
+        http = %listen,
+        map = settings.service.map.as_deref().map(|p| p.display().to_string()),
+        "starting"
+    );
+
+    let Service {
+        table,
+        signs,
+        slam,
+        watchdog,
+        ..
+    } = service;
+    let health = table.health().clone();
+    let stop = AtomicBool::new(false);
+    let mut watch = Watch {
+        cancelled: &cancelled,
+        notifier,
+        health: health.clone(),
+        signs: Arc::clone(&signs),
+        watchdog,
+        stop_line: &stop_line,
+        bitten: false,
+        ready: false,
+        told: Instant::now(),
+    };
+    let config = ThreadsConfig {
+        real_time: settings.service.real_time,
+        ..ThreadsConfig::default()
+    };
+    let outcome = std::thread::scope(|scope| {
+        let mut server = None;
+        let outcome = threads::run(table, config, |now, telemetry| {
+            if server.is_none() {
+                let page = Page {
+                    platform: platform.robot.name().to_owned(),
+                    telemetry: Arc::clone(telemetry),
+                    health: health.clone(),
+                    signs: Arc::clone(&signs),
+                };
+                let (listener, stop) = (&listener, &stop);
+                server = Some(scope.spawn(move || web::serve(listener, &page, stop)));
+            }
+            watch.look(now, telemetry)
+        });
+        health.stopping();
+        watch.notifier.stopping();
+        stand_still(&stop_line);
+        stop.store(true, Ordering::Release);
+        outcome
+    });
+    // The tasks are gone: what is under way is finished and kept.
+    let mut stage = slam
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    stage.finish();
+    info!(nodes = stage.slam().map().nodes().len(), "stopped");
+    outcome.map_err(|error| Failure::new(error, "see the log; systemd starts the service again"))
+}
+
+/// The settings, once they can be worked with.
+fn settings_in_the_end(
+    path: &Path,
+    cancelled: &Cancelled,
+    notifier: &mut Notifier,
+) -> Result<(Settings, Platform), Failure> {
+    let mut ready = false;
+    loop {
+        let seen = changed(path);
+        let failure = match settings(path) {
+            Ok(good) => return Ok(good),
+            Err(failure) => failure,
+        };
+        error!("{}: {failure}", Trouble::Settings.name());
+        if !ready {
+            notifier.ready();
+            ready = true;
+        }
+        notifier.status(&format!("the robot is not moved: {failure}"));
+        while changed(path) == seen {
+            if cancelled.is_cancelled() {
+                return Err(failure);
+            }
+            notifier.alive();
+            std::thread::sleep(Duration::from_millis(200));
+        }
+    }
+}
+
+fn settings(path: &Path) -> Result<(Settings, Platform), Failure> {
+    let settings = Settings::load(None, Some(path))?;
+    let Some(name) = &settings.robot.platform else {
+        return Err(Failure::new(
+            format_args!("{} does not say which robot it is", path.display()),
+            "set robot.platform to b1 or go1",
+        ));
+    };
+    let platform = platform_of(name)?;
+    Ok((settings, platform))
+}
+
+/// When a file was last written; `None` where it is not there.
+fn changed(path: &Path) -> Option<SystemTime> {
+    std::fs::metadata(path).and_then(|m| m.modified()).ok()
+}
+
+fn unopened(what: &str, error: &dyn std::fmt::Display, key: &str) -> Failure {
+    Failure::new(
+        format_args!("{what} can't be opened: {error}"),
+        format_args!("see what else uses it, or change {key}"),
+    )
+}
+
+fn stop_line(platform: &Platform, address: SocketAddr) -> Result<StopLine, Failure> {
+    let commander = CommanderConfig::default();
+    let local = match address.ip().is_loopback() {
+        true => address.ip(),
+        false => [0, 0, 0, 0].into(),
+    };
+    StopLine::open(
+        platform.robot,
+        address,
+        local,
+        commander.check_form,
+        commander.level,
+    )
+    .map_err(|error: io::Error| unopened("the second line to the robot", &error, "robot.address"))
+}
+
+fn udp_of(settings: &Settings) -> UdpConfig {
+    UdpConfig {
+        bind_address: settings.lidar.bind_address,
+        source_address: settings.lidar.source_address,
+        ..UdpConfig::on_ports(&settings.lidar.ports())
+    }
+}
+
+/// A robot that nobody talks to any more is told so, some times: datagrams get lost.
+fn stand_still(line: &StopLine) {
+    for _ in 0..10 {
+        if let Err(error) = line.stop() {
+            warn!(%error, "the robot can't be told to stand still");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// What the calling thread does while the tasks run.
+struct Watch<'a> {
+    cancelled: &'a Cancelled,
+    notifier: Notifier,
+    health: Health,
+    signs: SharedSigns,
+    watchdog: SoftWatchdog,
+    stop_line: &'a StopLine,
+    bitten: bool,
+    ready: bool,
+    told: Instant,
+}
+
+impl Watch<'_> {
+    /// Looks at everything once; whether to go on.
+    fn look(&mut self, now: Stamp, telemetry: &Arc<Telemetry>) -> bool {
+        let late_ns = self.watchdog.bites(now);
+        if let Some(late_ns) = late_ns {
+            if !self.bitten {
+                let late_ms = late_ns / 1_000_000;
+                error!(
+                    late_ms,
+                    "the command task hangs: the robot is told to stand still"
+                );
+            }
+            if let Err(error) = self.stop_line.stop() {
+                warn!(%error, "the robot can't be told to stand still");
+            }
+        }
+        self.bitten = late_ns.is_some();
+        if !self.ready {
+            self.ready = true;
+            self.notifier.ready();
+        }
+        // systemd starts a service again that does not say that it is alive: it is not where the
+        // command task or the event loop hangs.
+        let alive = late_ns.is_none() && self.signs.event_loop.is_fresh(now, 1_000_000_000);
+        let period = Notifier::watchdog_period().unwrap_or(Duration::from_secs(1));
+        if self.told.elapsed() >= period.min(Duration::from_secs(1)) {
+            self.told = Instant::now();
+            if alive {
+                self.notifier.alive();
+            }
+            let overruns = telemetry.hard_overruns();
+            let line = self.health.line();
+            self.notifier.status(&match overruns {
+                0 => line,
+                overruns => format!("{line}; {overruns} overruns of hard tasks"),
+            });
+        }
+        !self.cancelled.is_cancelled()
+    }
+}

@@ -1,0 +1,134 @@
+//! `base command`: hears the robot, asks the gate, tells the robot. The only task that can.
+
+use std::sync::atomic::Ordering;
+
+use hachi_behaviour::{Cause, Causes, GuardedBase, Obstacles, PlaceEstimate, Sight, Verdict};
+use hachi_hal::{BaseCommand, Stamp, Watchdog};
+use hachi_runtime::{Halt, Progress, Receiver, Sender, SoftWatchdog, Work};
+use hachi_unitree::BodySample;
+use hachi_unitree::device::RobotLink;
+use tracing::{info, warn};
+
+use super::body::UnitreeBody;
+use super::signs::SharedSigns;
+
+/// States taken in at one run: a B1 sends two in 5 ms; after a pause they come in a bunch.
+const MOST_AT_ONCE: usize = 32;
+
+/// The task.
+pub struct BaseCommandTask<L> {
+    /// The robot behind the gate.
+    pub base: GuardedBase<UnitreeBody<L>>,
+    /// What the gate knows.
+    pub sight: Sight,
+    /// Wishes of behaviours.
+    pub wishes: Receiver<BaseCommand>,
+    /// The last of them.
+    pub wish: Option<BaseCommand>,
+    /// Where the robot is.
+    pub places: Receiver<PlaceEstimate>,
+    /// What stands around.
+    pub around: Receiver<Obstacles>,
+    /// The last of it.
+    pub obstacles: Option<Obstacles>,
+    /// Legs and body, on to the legs' task.
+    pub bodies: Sender<BodySample>,
+    /// Whether a task broke a promise.
+    pub halt: Halt,
+    /// Fed with each run.
+    pub watchdog: SoftWatchdog,
+    /// What the task leaves for whoever asks.
+    pub signs: SharedSigns,
+    /// Why the robot stood when it was last said.
+    pub said: Causes,
+    /// Whether the last step failed at the base.
+    pub failing: bool,
+}
+
+impl<L: RobotLink + Send> Work for BaseCommandTask<L> {
+    fn run(&mut self, now: Stamp) -> Progress {
+        self.hear(now);
+        self.look();
+        let wish = self.wish.as_ref();
+        let verdict = match self
+            .base
+            .step(now, wish, &self.sight, self.obstacles.as_ref())
+        {
+            Ok(moved) => {
+                self.failing = false;
+                moved.verdict
+            }
+            Err(unmoved) => {
+                // Not at every run: a robot that lies refuses two hundred times a second.
+                if !self.failing {
+                    warn!(error = %unmoved.error, "the robot does not take the command");
+                }
+                self.failing = true;
+                unmoved.verdict
+            }
+        };
+        self.say(&verdict);
+        // Feeding can't fail: its error has no value.
+        let Ok(()) = self.watchdog.feed(now);
+        Progress::Done
+    }
+}
+
+impl<L: RobotLink> BaseCommandTask<L> {
+    /// Takes in what the robot sent.
+    fn hear(&mut self, now: Stamp) {
+        for _ in 0..MOST_AT_ONCE {
+            match self.base.listen(now) {
+                Ok(Some(report)) => {
+                    self.sight.robot = Some(report.stamp);
+                    self.signs.robot.set(report.stamp);
+                    self.sight.emergency_stop = report.stop.or(self.sight.emergency_stop);
+                    if let Some(battery) = report.battery {
+                        let percent = (100.0 * battery.charge).round() as u32;
+                        self.signs.battery_percent.store(percent, Ordering::Relaxed);
+                    }
+                    if let Some(body) = report.body {
+                        let _ = self.bodies.send(body);
+                    }
+                }
+                Ok(None) => return,
+                Err(error) => {
+                    if !self.failing {
+                        warn!(%error, "the link to the robot fails");
+                    }
+                    self.failing = true;
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Takes in what other tasks know.
+    fn look(&mut self) {
+        if let Some(place) = self.places.newest() {
+            self.sight.localisation = Some((place.stamp, place.trusted));
+        }
+        self.obstacles = self.around.newest().or(self.obstacles);
+        self.wish = self.wishes.newest().or(self.wish);
+        self.sight.event_loop = self.signs.event_loop.get();
+        self.sight.task_overrun = self.halt.is_asked_for();
+    }
+
+    /// Says what changed. That nobody wishes anything is no news: it is how a robot rests.
+    fn say(&mut self, verdict: &Verdict) {
+        self.signs.set_causes(verdict.causes);
+        if verdict.limited {
+            self.signs.limited.fetch_add(1, Ordering::Relaxed);
+        }
+        for cause in verdict.causes.without(self.said).iter() {
+            match cause {
+                Cause::NoWish | Cause::Obstacle => info!("{}", cause.line()),
+                _ => warn!("{}", cause.line()),
+            }
+        }
+        if verdict.causes.is_empty() && !self.said.is_empty() {
+            info!("going on");
+        }
+        self.said = verdict.causes;
+    }
+}

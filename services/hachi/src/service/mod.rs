@@ -1,0 +1,39 @@
+//! The service: a robot's sensors and base, and the tasks between them. Read [`wiring`] first: it is
+//! the flow.
+//!
+//! In: packets of the LiDAR and states of the robot, from sockets or from the simulated robot. Out:
+//! a map, a place on it, commands that passed the gate, health and telemetry. The same tasks run by
+//! threads (`hachi run`) and in virtual time (`hachi demo`).
+//!
+//! | module | task | released by |
+//! |---|---|---|
+//! | [`base`] | `base command`: hears the robot, asks the gate, tells the robot | 5 ms |
+//! | [`lidar`] | `lidar receive`: packets to scans | 2 ms |
+//! | [`legs`] | `legs`: footprint and leg odometry | a state of the robot |
+//! | [`filter`] | `filter`: obstacles first, then which points are kept | a scan |
+//! | [`odometry`] | `odometry`: where the scan was | a filtered scan |
+//! | [`slam`] | `slam`: nodes, loops, the map | a placed scan |
+//! | [`behaviour`] | `behaviour`: the patrol | 50 ms |
+//! | [`supervisor`] | `supervisor`: what is stale, what is wrong | 50 ms |
+//!
+//! [`messages`] is what passes between them, [`signs`] what each leaves for whoever asks, [`rows`]
+//! the table's numbers, [`settings`] the file they come from, [`simulator`] the other side of the
+//! wire, [`web`] what is told over HTTP.
+
+pub mod base;
+pub mod behaviour;
+pub mod body;
+pub mod crew;
+pub mod filter;
+pub mod legs;
+pub mod lidar;
+pub mod messages;
+pub mod odometry;
+pub mod rows;
+pub mod settings;
+pub mod signs;
+pub mod simulator;
+pub mod slam;
+pub mod supervisor;
+pub mod web;
+pub mod wiring;

@@ -1,0 +1,307 @@
+//! The flow: from the packets of a LiDAR and the states of a robot to a map and to commands.
+//!
+//! ```text
+//! packets ─ lidar receive ─ filter ─ odometry ─ slam
+//!                             │ obstacles  │ place ↖ correction
+//! states ─ base command ←─────┴── gate ────┤
+//!    │         ↑ wish                      ↓
+//!    └ legs    └──────────────────── behaviour
+//! ```
+
+use std::sync::{Arc, Mutex};
+
+use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Patrol, SafetyGate, Sight};
+use hachi_bridge::message::Sensor;
+use hachi_cloud::Filters;
+use hachi_hal::{LidarScans, PacketSource, Pose, Rotation};
+use hachi_odometry::Odometry;
+use hachi_robosense::{RobosenseConfig, RobosenseScans};
+use hachi_runtime::{Histogram, SoftWatchdog, TaskClock, TaskTable, WhenFull, Work, bounded};
+use hachi_slam::Slam;
+use hachi_unitree::LegTracker;
+use hachi_unitree::device::{HighClient, RobotLink};
+use hachi_velodyne::{VelodyneConfig, VelodyneScans};
+use nalgebra::Translation3;
+
+use super::base::BaseCommandTask;
+use super::behaviour::Behaviour;
+use super::body::UnitreeBody;
+use super::crew::Crew;
+use super::filter::Filter;
+use super::legs::Legs;
+use super::lidar::LidarReceive;
+use super::messages::{Belt, Correction, Kept, Placed, Scan, belt};
+use super::odometry::OdometryTask;
+use super::settings::{Platform, row};
+use super::signs::SharedSigns;
+use super::slam::SlamTask;
+use super::supervisor::Supervisor;
+use super::{odometry, rows};
+use crate::config::{MotionInput, Settings};
+use crate::exit::Failure;
+use crate::record::RunRecord;
+use crate::slam_stage::SlamStage;
+
+/// The base command task is fed to the watchdog; after this it hangs, ns. Twenty of its runs.
+const WATCHDOG_NS: i64 = 100_000_000;
+
+/// What the service is connected to.
+pub struct Devices<P, L> {
+    /// The robot.
+    pub platform: Platform,
+    /// Its high-level service.
+    pub client: HighClient<L>,
+    /// The LiDAR's packets.
+    pub packets: P,
+    /// Which sensor sends them.
+    pub sensor: Sensor,
+}
+
+/// How the tasks are run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Running {
+    /// By threads, each with so many cores for its parallel work (0: all); without an end, so that
+    /// no path is kept.
+    Threads(usize),
+    /// By one thread in virtual time, with the path kept.
+    VirtualTime,
+}
+
+impl Running {
+    /// Whether the run ends by itself, so that what it keeps of its path is bounded.
+    fn has_an_end(self) -> bool {
+        self == Self::VirtualTime
+    }
+
+    fn crew(self, priority: u8) -> Crew {
+        match self {
+            Self::VirtualTime => Crew::ambient(),
+            Self::Threads(0) => {
+                let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+                Crew::own(cores, priority)
+            }
+            Self::Threads(threads) => Crew::own(threads, priority),
+        }
+    }
+}
+
+/// The service, ready for an executor.
+pub struct Service {
+    /// Its tasks.
+    pub table: TaskTable,
+    /// What they leave.
+    pub signs: SharedSigns,
+    /// What was done so far; the tasks hold it while they run.
+    pub record: Arc<Mutex<RunRecord>>,
+    /// SLAM; likewise.
+    pub slam: Arc<Mutex<SlamStage>>,
+    /// Bites when the base command task hangs.
+    pub watchdog: SoftWatchdog,
+    /// How long a scan takes through filter, odometry and SLAM.
+    pub scan_times: Arc<Histogram>,
+}
+
+/// Puts the tasks together.
+///
+/// # Errors
+/// A setting that no filter can work with.
+pub fn assemble<P, L>(
+    settings: &Settings,
+    devices: Devices<P, L>,
+    slam: Slam,
+    clock: TaskClock,
+    running: Running,
+) -> Result<Service, Failure>
+where
+    P: PacketSource + Send + 'static,
+    L: RobotLink + Send + 'static,
+{
+    let base_from_lidar = settings.base_from_lidar.pose();
+    let mut table = TaskTable::new(clock);
+    let signs = SharedSigns::default();
+    let record = Arc::new(Mutex::new(RunRecord::new(running.has_an_end())));
+    let stage = SlamStage::new(slam, base_from_lidar);
+    let stage = match running.has_an_end() {
+        true => stage,
+        false => stage.without_path(),
+    };
+    let slam = Arc::new(Mutex::new(stage));
+    let watchdog = SoftWatchdog::new(WATCHDOG_NS);
+
+    let [to_legs, to_filter, to_odometry, to_slam, nobody] = [0; 5].map(|_| table.bell());
+    let (scans, scans_end) = belt::<Scan>(&table, "scans", 2, &to_filter);
+    let (kept, kept_end) = belt::<Kept>(&table, "kept scans", 2, &to_odometry);
+    let (placed, placed_end) = belt::<Placed>(&table, "placed scans", 4, &to_slam);
+    let (bodies, bodies_end) = bounded("bodies", 64, WhenFull::DropOldest, &to_legs);
+    // A scan of a tenth of a second asks for the samples of a fifth.
+    let (motion, motion_end) = bounded("leg motion", 256, WhenFull::DropOldest, &nobody);
+    let (ground, ground_end) = bounded("ground", 2, WhenFull::DropOldest, &nobody);
+    let (around, around_end) = bounded("obstacles", 2, WhenFull::DropOldest, &nobody);
+    let (corrections, corrections_end) = bounded("corrections", 2, WhenFull::DropOldest, &nobody);
+    let (to_gate, gate_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
+    let (to_behaviour, behaviour_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
+    let (wishes, wishes_end) = bounded("wishes", 4, WhenFull::DropOldest, &nobody);
+
+    let gauges = vec![wishes_end.gauge(), gate_places.gauge(), around_end.gauge()];
+    let gate = SafetyGate::new(settings.safety);
+    let base_command = BaseCommandTask {
+        base: GuardedBase::new(gate, UnitreeBody(devices.client)),
+        sight: Sight::default(),
+        wishes: wishes_end,
+        wish: None,
+        places: gate_places,
+        around: around_end,
+        obstacles: None,
+        bodies,
+        halt: table.halt().clone(),
+        watchdog: watchdog.clone(),
+        signs: Arc::clone(&signs),
+        said: Causes::default(),
+        failing: false,
+    };
+    let bell = table.bell();
+    let spec = row(settings, rows::BASE_COMMAND);
+    table.add(spec, bell, gauges, Box::new(base_command));
+
+    let receive = lidar_receive(devices.sensor, devices.packets, scans, Arc::clone(&signs));
+    let bell = table.bell();
+    table.add(row(settings, rows::LIDAR_RECEIVE), bell, vec![], receive);
+
+    let gauges = vec![bodies_end.gauge()];
+    let legs = Legs {
+        tracker: LegTracker::new(devices.platform.robot),
+        bodies: bodies_end,
+        motion,
+        ground,
+    };
+    table.add(row(settings, rows::LEGS), to_legs, gauges, Box::new(legs));
+
+    let supervisor = Supervisor {
+        signs: Arc::clone(&signs),
+        health: table.health().clone(),
+        begun: None,
+        started: false,
+    };
+    let bell = table.bell();
+    table.add(
+        row(settings, rows::SUPERVISOR),
+        bell,
+        vec![],
+        Box::new(supervisor),
+    );
+
+    let spec = row(settings, rows::FILTER);
+    // Of states only the newest counts: that the others go is no loss, and is not told.
+    let gauges = vec![scans_end.full.gauge()];
+    let standing = Translation3::new(0.0, 0.0, devices.platform.standing_m);
+    let filter = Filter {
+        filters: Filters::new(settings.filter.clone())
+            .map_err(|error| Failure::new(error, "correct the [filter] section"))?,
+        finder: ObstacleFinder::new(&settings.safety),
+        base_from_lidar,
+        usual_footprint_from_base: Pose::from_parts(standing, Rotation::identity()),
+        felt: None,
+        ground: ground_end,
+        scans: scans_end,
+        obstacles: around,
+        out: kept,
+        crew: running.crew(spec.priority),
+        level: 0,
+    };
+    table.add(spec, to_filter, gauges, Box::new(filter));
+
+    let spec = row(settings, rows::ODOMETRY);
+    let gauges = vec![kept_end.full.gauge(), motion_end.gauge()];
+    let latencies = [
+        table.latency("first packet to pose"),
+        table.latency("last packet to pose"),
+    ];
+    let odometry = OdometryTask {
+        odometry: Odometry::new(settings.odometry.clone()),
+        base_from_lidar,
+        scans: kept_end,
+        motion: motion_end,
+        samples: Vec::with_capacity(odometry::SAMPLES),
+        corrections: corrections_end,
+        correction: Correction {
+            map_from_odom: Pose::identity(),
+            trusted: true,
+        },
+        out: placed,
+        places: [to_gate, to_behaviour],
+        record: Arc::clone(&record),
+        latencies,
+        signs: Arc::clone(&signs),
+        clock: table.clock().clone(),
+        crew: running.crew(spec.priority),
+        uses_legs: settings.motion == MotionInput::Odometry,
+    };
+    table.add(spec, to_odometry, gauges, Box::new(odometry));
+
+    let behaviour = Behaviour {
+        patrol: Patrol::new(settings.patrol.clone()),
+        places: behaviour_places,
+        place: None,
+        wishes,
+    };
+    let bell = table.bell();
+    table.add(
+        row(settings, rows::BEHAVIOUR),
+        bell,
+        vec![],
+        Box::new(behaviour),
+    );
+
+    let spec = row(settings, rows::SLAM);
+    let scan_times = table.latency("filter to map");
+    let gauges = vec![placed_end.full.gauge()];
+    let task = SlamTask {
+        stage: Arc::clone(&slam),
+        scans: placed_end,
+        corrections,
+        signs: Arc::clone(&signs),
+        crew: running.crew(spec.priority),
+        level: 0,
+        count: 0,
+        scan_times: Arc::clone(&scan_times),
+    };
+    table.add(spec, to_slam, gauges, Box::new(task));
+    Ok(Service {
+        table,
+        signs,
+        record,
+        slam,
+        watchdog,
+        scan_times,
+    })
+}
+
+/// The driver of a sensor, as a task.
+fn lidar_receive<P: PacketSource + Send + 'static>(
+    sensor: Sensor,
+    packets: P,
+    out: Belt<Scan>,
+    signs: SharedSigns,
+) -> Box<dyn Work> {
+    fn task<S>(scans: S, out: Belt<Scan>, signs: SharedSigns) -> Box<dyn Work>
+    where
+        S: LidarScans + Send + 'static,
+    {
+        Box::new(LidarReceive {
+            scans,
+            out,
+            signs,
+            failures: 0,
+        })
+    }
+    match sensor {
+        Sensor::Velodyne => {
+            let scans = VelodyneScans::new(packets, VelodyneConfig::default());
+            task(scans, out, signs)
+        }
+        Sensor::Robosense => {
+            let scans = RobosenseScans::new(packets, RobosenseConfig::default());
+            task(scans, out, signs)
+        }
+    }
+}
