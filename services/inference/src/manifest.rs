@@ -233,7 +233,8 @@ impl Manifest {
             }
         }
         let grids = matches!(self.decoder, Decoder::Yolox { .. } | Decoder::Yolov8 { .. });
-        if grids && (input.width % COARSEST != 0 || input.height % COARSEST != 0) {
+        let whole = |side: usize| side.is_multiple_of(COARSEST);
+        if grids && !(whole(input.width) && whole(input.height)) {
             let found = format!("{}x{}", input.width, input.height);
             return value("input.width and input.height", found, "multiples of 32");
         }

@@ -42,11 +42,11 @@ pub enum DecodeError {
 }
 
 /// An output of `N` dimensions, all numbers finite; `expected` is `None` where any size will do.
-pub(super) fn output<'a, const N: usize>(
-    outputs: &'a [Tensor],
+pub(super) fn output<const N: usize>(
+    outputs: &[Tensor],
     index: usize,
     expected: [Option<usize>; N],
-) -> Result<([usize; N], &'a [f32]), DecodeError> {
+) -> Result<([usize; N], &[f32]), DecodeError> {
     let found = outputs.get(index).map_or(&[][..], Tensor::shape);
     let fits = |(e, f): (&Option<usize>, &usize)| e.is_none_or(|e| e == *f);
     let shape: Option<[usize; N]> = found.try_into().ok();
