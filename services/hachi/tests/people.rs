@@ -141,7 +141,8 @@ fn people_in_real_images_keep_their_numbers() {
     .json();
     assert_eq!(metrics["ids"], 0);
     assert!(metrics["precision"].as_f64().unwrap() > 0.8, "{metrics}");
-    assert!(out["people"].as_u64().unwrap() >= 8, "{out}");
+    // Three frames make only the surest a person.
+    assert!(out["people"].as_u64().unwrap() >= 3, "{out}");
 }
 
 #[test]
