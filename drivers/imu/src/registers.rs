@@ -22,7 +22,7 @@ pub(crate) const RESET_DONE: u8 = 0x10;
 /// [`POWER`] with gyroscope and accelerometer in their low-noise mode.
 pub(crate) const LOW_NOISE: u8 = 0x0F;
 
-/// Bytes of a measurement from [`TEMPERATURE`] on: temperature, accelerations, turning rates.
+/// Bytes of a measurement: temperature, accelerations, turning rates.
 pub const MEASUREMENT_LEN: usize = 14;
 
 /// What a register holds before its first measurement (section 14.6 and on).

@@ -38,6 +38,8 @@ pub enum Command {
     Demo(mapping::DemoArguments),
     /// Run the service on a robot: map, know where it is, go where it shall, stop in time.
     Run(service::RunArguments),
+    /// Keep what a robot's LiDAR and legs send in an MCAP file.
+    Record(service::RecordArguments),
     /// Be a robot and its LiDAR, in real time, for `hachi run` to be tried on.
     Simulate(service::SimulateArguments),
     /// Show the tasks of a running service, live.

@@ -11,7 +11,8 @@
 //! | [`report`], [`latency`] | `report.json`, and the times that go into it |
 //! | [`log`] | logging |
 //! | [`mapping`] | the flow from scans to trajectory and map: read it first |
-//! | [`recording`], [`motion_samples`] | recordings of any kind as scans and samples |
+//! | [`recording`], [`motion_samples`], [`leg_samples`] | recordings of any kind as scans and samples |
+//! | [`recorder`] | what sensors sent, as a file |
 //! | [`record`] | what a run has done so far |
 //! | [`service`] | the service on a robot, task by task |
 //! | [`config`] | settings |
@@ -32,6 +33,7 @@ pub mod exit;
 pub mod images;
 pub mod interrupt;
 pub mod latency;
+pub mod leg_samples;
 pub mod log;
 pub mod map_builder;
 pub mod map_picture;
@@ -43,6 +45,7 @@ pub mod output;
 pub mod precision_recall_picture;
 pub mod progress;
 pub mod record;
+pub mod recorder;
 pub mod recording;
 pub mod report;
 pub mod results;
@@ -63,7 +66,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Err(error) => return exit::usage(&error),
     };
     // A service that runs for weeks says what happens without being asked.
-    let usual = matches!(cli.command, cli::Command::Run(_)).then_some("info");
+    use cli::Command::{Record, Run};
+    let usual = matches!(cli.command, Run(_) | Record(_)).then_some("info");
     let outcome =
         log::start(cli.log.as_deref(), usual).and_then(|()| commands::dispatch(cli.command));
     exit::status(outcome)

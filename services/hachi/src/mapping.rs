@@ -88,6 +88,12 @@ impl Mapping {
         self
     }
 
+    /// Where the ground is for the scans that follow, as legs feel it; else filters look for it.
+    pub fn stand_on(&mut self, footprint_from_base: Option<Pose>) {
+        let base_from_lidar = self.frames.base_from_lidar;
+        self.frames.footprint_from_lidar = footprint_from_base.map(|f| f * base_from_lidar);
+    }
+
     /// One scan: filter, place, remember.
     ///
     /// # Errors
@@ -273,6 +279,7 @@ pub fn run(
         }
         motion.read_until(last_end, header.end);
         last_end = header.end;
+        mapping.stand_on(motion.footprint_from_base(header.end));
         let started = Instant::now();
         let estimate = mapping.step(&header, &points, motion.imu(), motion.odometry());
         mapping.times.stage(READ, read);

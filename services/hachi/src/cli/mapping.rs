@@ -36,6 +36,10 @@ pub struct DemoArguments {
     /// campus-long, and with --stage odometry.
     #[arg(long)]
     pub scripted: bool,
+    /// Keep what LiDAR and legs sent in this MCAP file, for `hachi replay`, Foxglove and ROS 2; of a
+    /// robot that the service drives.
+    #[arg(long, value_name = "FILE", conflicts_with = "scripted")]
+    pub record: Option<PathBuf>,
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
     pub stage: StageArgument,

@@ -20,6 +20,27 @@ pub struct RunArguments {
     pub config: PathBuf,
 }
 
+/// Arguments of `hachi record`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+The service without a patrol and without a map file: the robot stands, or is driven by its remote \
+control. Topics: /velodyne_packets or /rslidar_packets, /imu, /joint_states, /leg_odometry.
+
+Example:
+  hachi record --config /etc/hachi/hachi.toml --out drive.mcap --seconds 60
+  hachi replay drive.mcap --platform b1 --out out/drive --stage slam")]
+pub struct RecordArguments {
+    /// Settings; robot.platform names the robot.
+    #[arg(long, value_name = "FILE")]
+    pub config: PathBuf,
+    /// The recording; one that is there already is not touched.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Ends after so long [default: when it is told to stop].
+    #[arg(long, value_name = "S", value_parser = super::seconds)]
+    pub seconds: Option<f64>,
+}
+
 /// Arguments of `hachi simulate`.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\

@@ -27,7 +27,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         filter.apply(&mut config.filter);
     }
     let mut source = recording::open(&arguments.input)?;
-    let mut motion = MotionSamples::open(&arguments.input, config.motion)?;
+    let mut motion = MotionSamples::open(
+        &arguments.input,
+        config.motion,
+        arguments.platform.as_deref(),
+    )?;
     let results = Results::create_for(&arguments.input, &arguments.out)?;
     let cancelled = Cancelled::on_interrupt()?;
     let bar = progress::bar(source.scan_count(), "scans");

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use hachi_bridge::message::Sensor;
 use hachi_datagram::{SystemClock, UdpConfig, UdpSource};
-use hachi_hal::Stamp;
+use hachi_hal::{Clock, Stamp};
 use hachi_runtime::executor::threads::{self, ThreadsConfig};
 use hachi_runtime::notify::Notifier;
 use hachi_runtime::{Health, SoftWatchdog, TaskClock, Telemetry, Trouble};
@@ -24,23 +24,40 @@ use tracing::{error, info, warn};
 
 use super::replay::slam;
 use super::simulate::platform_of;
-use crate::cli::service::RunArguments;
+use crate::cli::service::{RecordArguments, RunArguments};
 use crate::config::Settings;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
+use crate::recorder::Recorder;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
 use crate::service::web::{self, Page};
 use crate::service::wiring::{Devices, Running, Service, assemble};
 
-/// Runs the command.
+/// Runs `hachi run`.
 ///
 /// # Errors
 /// A device or the map can't be opened, or a task ended that should not have.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
+    serve(&arguments.config, None)
+}
+
+/// Runs `hachi record`.
+///
+/// # Errors
+/// As [`run`]; also where the recording can't be begun.
+pub fn record(arguments: &RecordArguments) -> Result<(), Failure> {
+    serve(&arguments.config, Some(arguments))
+}
+
+fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failure> {
     let cancelled = Cancelled::on_interrupt()?;
     let mut notifier = Notifier::default();
-    let (settings, platform) = settings_in_the_end(&arguments.config, &cancelled, &mut notifier)?;
+    let (mut settings, platform) = settings_in_the_end(config, &cancelled, &mut notifier)?;
+    if recording.is_some() {
+        settings.patrol.places.clear();
+        settings.service.map = None;
+    }
     let clock = SystemClock::new();
     let config = platform.client(&settings.robot);
     let stop_line = stop_line(&platform, config.robot)?;
@@ -61,7 +78,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let map = settings.service.map.as_deref();
     let slam = slam(map, settings.robot.platform.as_deref(), &settings.mapping())?;
     let running = Running::Threads(settings.service.threads);
-    let service = assemble(&settings, devices, slam, TaskClock::new(clock), running)?;
+    let recorder = match recording {
+        Some(recording) => Some(Recorder::create(&recording.out, devices.sensor)?),
+        None => None,
+    };
+    let tasks = TaskClock::new(clock);
+    let service = assemble(&settings, devices, slam, tasks, running, recorder)?;
     info!(
         robot = platform.robot.name(),
         http = %listen,
@@ -88,6 +110,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         bitten: false,
         ready: false,
         told: Instant::now(),
+        ends: recording
+            .and_then(|recording| recording.seconds)
+            .map(|seconds| clock.now() + (seconds * 1e9) as i64),
     };
     let config = ThreadsConfig {
         real_time: settings.service.real_time,
@@ -221,6 +246,7 @@ struct Watch<'a> {
     bitten: bool,
     ready: bool,
     told: Instant,
+    ends: Option<Stamp>,
 }
 
 impl Watch<'_> {
@@ -260,6 +286,7 @@ impl Watch<'_> {
                 overruns => format!("{line}; {overruns} overruns of hard tasks"),
             });
         }
-        !self.cancelled.is_cancelled()
+        let over = self.ends.is_some_and(|ends| now >= ends);
+        !over && !self.cancelled.is_cancelled()
     }
 }

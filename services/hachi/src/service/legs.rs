@@ -14,6 +14,8 @@ pub struct Legs {
     pub motion: Sender<OdometrySample>,
     /// Where the ground is, to the filters: `footprint_from_base`.
     pub ground: Sender<(Stamp, Pose)>,
+    /// To the recorder, if there is one.
+    pub record: Option<Sender<(BodySample, OdometrySample)>>,
 }
 
 impl Work for Legs {
@@ -24,6 +26,9 @@ impl Work for Legs {
                 continue;
             };
             let _ = self.motion.send(estimate.motion.sample);
+            if let Some(record) = &self.record {
+                let _ = record.send((sample, estimate.motion.sample));
+            }
             if let Some(footprint) = estimate.footprint {
                 let _ = self
                     .ground

@@ -14,6 +14,7 @@
 //! | [`odometry`] | `odometry`: where the scan was | a filtered scan |
 //! | [`slam`] | `slam`: nodes, loops, the map | a placed scan |
 //! | [`behaviour`] | `behaviour`: the patrol | 50 ms |
+//! | [`record`] | `recorder`: what sensors sent, to a file; where one is wanted | 50 ms |
 //! | [`supervisor`] | `supervisor`: what is stale, what is wrong | 50 ms |
 //!
 //! [`messages`] is what passes between them, [`signs`] what each leaves for whoever asks, [`rows`]
@@ -29,6 +30,7 @@ pub mod legs;
 pub mod lidar;
 pub mod messages;
 pub mod odometry;
+pub mod record;
 pub mod rows;
 pub mod settings;
 pub mod signs;

@@ -98,8 +98,11 @@ pub const SLAM: TaskSpec = with_ladder(
     slam::LADDER,
 );
 
-/// The tasks of every service, in the order of the table.
-pub const ALL: [TaskSpec; 8] = [
+/// What sensors sent, to a file.
+pub const RECORDER: TaskSpec = row("recorder", every(50), 20_000, 10);
+
+/// The tasks of a service, in the order of the table.
+pub const ALL: [TaskSpec; 9] = [
     BASE_COMMAND,
     LIDAR_RECEIVE,
     LEGS,
@@ -108,6 +111,7 @@ pub const ALL: [TaskSpec; 8] = [
     ODOMETRY,
     BEHAVIOUR,
     SLAM,
+    RECORDER,
 ];
 
 #[cfg(test)]

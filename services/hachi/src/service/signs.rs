@@ -80,6 +80,8 @@ pub struct Signs {
     pub nodes: AtomicU64,
     /// Whether the map can't be kept.
     pub store_fails: AtomicBool,
+    /// Whether the recording can't be written.
+    pub recording_fails: AtomicBool,
     /// Commands that were cut to a limit.
     pub limited: AtomicU64,
     /// Charge of the battery, per cent; 255 while it is unknown.

@@ -46,7 +46,8 @@ impl Work for Supervisor {
         self.tell(Trouble::RobotLost, lost(&signs.robot));
         let poor = !matches!(signs.condition.get(), "OK" | "UNKNOWN");
         self.tell(Trouble::LocalisationPoor, poor);
-        let full = signs.store_fails.load(Ordering::Relaxed);
+        let full = signs.store_fails.load(Ordering::Relaxed)
+            || signs.recording_fails.load(Ordering::Relaxed);
         self.tell(Trouble::DiskFull, full);
         Progress::Done
     }

@@ -32,14 +32,16 @@ use super::legs::Legs;
 use super::lidar::LidarReceive;
 use super::messages::{Belt, Correction, Kept, Placed, Scan, belt};
 use super::odometry::OdometryTask;
+use super::record::{Datagram, RecorderTask, Tap};
 use super::settings::{Platform, row};
 use super::signs::SharedSigns;
 use super::slam::SlamTask;
 use super::supervisor::Supervisor;
-use super::{odometry, rows};
+use super::{odometry, record, rows};
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::record::RunRecord;
+use crate::recorder::Recorder;
 use crate::slam_stage::SlamStage;
 
 /// The base command task is fed to the watchdog; after this it hangs, ns. Twenty of its runs.
@@ -111,6 +113,7 @@ pub fn assemble<P, L>(
     slam: Slam,
     clock: TaskClock,
     running: Running,
+    recorder: Option<Recorder>,
 ) -> Result<Service, Failure>
 where
     P: PacketSource + Send + 'static,
@@ -140,6 +143,11 @@ where
     let (corrections, corrections_end) = bounded("corrections", 2, WhenFull::DropOldest, &nobody);
     let (to_gate, gate_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
     let (to_behaviour, behaviour_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
+    let (record_bodies, bodies_to_record) =
+        bounded("bodies to record", 64, WhenFull::DropOldest, &nobody);
+    let (record_packets, packets_to_record) =
+        belt::<Datagram>(&table, "packets to record", record::WAITING, &nobody);
+    let records = recorder.is_some();
     let (wishes, wishes_end) = bounded("wishes", 4, WhenFull::DropOldest, &nobody);
 
     let gauges = vec![wishes_end.gauge(), gate_places.gauge(), around_end.gauge()];
@@ -163,7 +171,11 @@ where
     let spec = row(settings, rows::BASE_COMMAND);
     table.add(spec, bell, gauges, Box::new(base_command));
 
-    let receive = lidar_receive(devices.sensor, devices.packets, scans, Arc::clone(&signs));
+    let packets = Tap {
+        source: devices.packets,
+        out: records.then_some(record_packets),
+    };
+    let receive = lidar_receive(devices.sensor, packets, scans, Arc::clone(&signs));
     let bell = table.bell();
     table.add(row(settings, rows::LIDAR_RECEIVE), bell, vec![], receive);
 
@@ -173,6 +185,7 @@ where
         bodies: bodies_end,
         motion,
         ground,
+        record: records.then_some(record_bodies),
     };
     table.add(row(settings, rows::LEGS), to_legs, gauges, Box::new(legs));
 
@@ -266,6 +279,19 @@ where
         scan_times: Arc::clone(&scan_times),
     };
     table.add(spec, to_slam, gauges, Box::new(task));
+
+    if records {
+        let gauges = vec![packets_to_record.full.gauge(), bodies_to_record.gauge()];
+        let task = RecorderTask {
+            recorder,
+            packets: packets_to_record,
+            bodies: bodies_to_record,
+            batch: Vec::with_capacity(record::WAITING + 2),
+            signs: Arc::clone(&signs),
+        };
+        let bell = table.bell();
+        table.add(row(settings, rows::RECORDER), bell, gauges, Box::new(task));
+    }
     Ok(Service {
         table,
         signs,

@@ -25,6 +25,7 @@ use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::map_builder::MapBuilder;
 use crate::mapping::Ended;
+use crate::recorder::Recorder;
 use crate::results::Results;
 use crate::service::settings::Platform;
 use crate::service::signs::SharedSigns;
@@ -83,7 +84,11 @@ pub fn walk(
     let clock = VirtualClock::starting_at(world.start);
     let map = arguments.map.as_deref();
     let slam = slam(map, Some(&arguments.platform), &settings.mapping())?;
-    let (service, truth) = connect(&settings, &platform, &world, &clock, slam)?;
+    let recorder = match &arguments.record {
+        Some(path) => Some(Recorder::create(path, sensor_of(&world))?),
+        None => None,
+    };
+    let (service, truth) = connect(&settings, &platform, &world, &clock, (slam, recorder))?;
     let Service {
         table,
         signs,
@@ -144,13 +149,20 @@ pub fn walk(
     Ok(walked)
 }
 
+fn sensor_of(world: &SimulationConfig) -> Sensor {
+    match world.sensor {
+        SensorKind::Helios16P => Sensor::Robosense,
+        _ => Sensor::Velodyne,
+    }
+}
+
 /// The service on one end of the wires, the simulated robot on the other.
 fn connect(
     settings: &Settings,
     platform: &Platform,
     world: &SimulationConfig,
     clock: &VirtualClock,
-    slam: Slam,
+    (slam, recorder): (Slam, Option<Recorder>),
 ) -> Result<(Service, Truth), Failure> {
     let link = MemoryLink::new(clock.clone());
     let packets = MemoryPackets::default();
@@ -162,13 +174,17 @@ fn connect(
         platform: *platform,
         client,
         packets: packets.clone(),
-        sensor: match world.sensor {
-            SensorKind::Helios16P => Sensor::Robosense,
-            _ => Sensor::Velodyne,
-        },
+        sensor: sensor_of(world),
     };
     let tasks = TaskClock::new(clock.clone());
-    let mut service = assemble(settings, devices, slam, tasks, Running::VirtualTime)?;
+    let mut service = assemble(
+        settings,
+        devices,
+        slam,
+        tasks,
+        Running::VirtualTime,
+        recorder,
+    )?;
     let body = WalkingBody::standing(platform, world);
     let config = SimulatedRobotConfig::for_robot(robot);
     let simulator = SimulatorTask {

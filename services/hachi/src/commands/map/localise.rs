@@ -48,7 +48,11 @@ pub fn run(arguments: &MapLocaliseArguments) -> Result<(), Failure> {
     )
     .map_err(|error| Failure::new(error, "restore the map from a copy, or map anew"))?;
     let mut source = recording::open(&arguments.input)?;
-    let mut motion = MotionSamples::open(&arguments.input, config.motion)?;
+    let mut motion = MotionSamples::open(
+        &arguments.input,
+        config.motion,
+        arguments.platform.as_deref(),
+    )?;
     let cancelled = Cancelled::on_interrupt()?;
     let bar = progress::bar(source.scan_count(), "scans");
     // No map is written: nothing is put into this folder.
