@@ -440,7 +440,11 @@ fn the_lidar_sees_the_people_too() {
     }
     // Two turns of 59 shots (0.6 m at 3 m, 0.2 degrees apart) in the 14 rings between shoes and
     // crown would be 1,650 on a box as wide as the shoulders; a body fills about two thirds of it.
-    assert!((800..1_400).contains(&on_person.len()), "{}", on_person.len());
+    assert!(
+        (800..1_400).contains(&on_person.len()),
+        "{}",
+        on_person.len()
+    );
     assert!(others > 10_000, "{others}");
     let lidar_at = simulation.map_from_lidar(simulation.start).translation;
     let away = (3.0 - lidar_at.x).hypot(-1.0 - lidar_at.y);
