@@ -87,7 +87,7 @@ fn the_motion_within_a_scan_is_found_without_an_inertial_sensor() {
             .collect();
         // The guess: the sensor stands still.
         let mut chain = Chain::starting_at(start);
-        chain.extend(INTERVALS, f64::from(last));
+        chain.extend(0.0, INTERVALS, f64::from(last));
         let config = MovingConfig {
             reach_m: 1.0,
             first_reach_m: 2.0,

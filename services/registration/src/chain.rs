@@ -29,6 +29,8 @@ pub struct Chain {
     /// Seconds from each knot to the next.
     gaps_s: [f64; KNOTS - 1],
     len: usize,
+    /// The first new interval bridges a time without scans.
+    leads: bool,
     /// What the scan before left known of the first two knots.
     expected: [Pose; 2],
     information: Information12,
@@ -54,6 +56,9 @@ pub struct Agility {
     pub acceleration: f64,
     /// rad/s².
     pub angular_acceleration: f64,
+    /// How many times more than ordinary the speed may change between two scans.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub between_scans: f64,
 }
 
 impl Default for Agility {
@@ -62,6 +67,7 @@ impl Default for Agility {
         Self {
             acceleration: 8.0,
             angular_acceleration: 8.0,
+            between_scans: 1.0,
         }
     }
 }
@@ -77,6 +83,7 @@ impl Chain {
             poses: [pose; KNOTS],
             gaps_s: [0.1; KNOTS - 1],
             len: 2,
+            leads: false,
             expected: [pose; 2],
             information,
         }
@@ -100,8 +107,9 @@ impl Chain {
     }
 
     /// Forgets all but the last two knots and appends `intervals` new ones over `span_s` seconds,
-    /// guessed at the speed of the scan before.
-    pub fn extend(&mut self, intervals: usize, span_s: f64) {
+    /// guessed at the speed of the scan before. Where scans are missing before this one, `lead_s` is
+    /// the time without any: it is bridged by the first interval, the others cut up the rest.
+    pub fn extend(&mut self, lead_s: f64, intervals: usize, span_s: f64) {
         let (kept, intervals) = (self.len - 2, intervals.clamp(1, MAX_INTERVALS));
         // The mean over the scan before: the last gap alone is short and noisy.
         let old_span: f64 = self.gaps_s[1..self.len.max(3) - 1].iter().sum();
@@ -110,20 +118,31 @@ impl Chain {
         } else {
             Pose::identity()
         };
-        let (first_gap, gap) = (self.gaps_s[kept], span_s / intervals as f64);
+        let first_gap = self.gaps_s[kept];
         self.poses.copy_within(kept..self.len, 0);
         self.expected = [self.poses[0], self.poses[1]];
         self.len = 2 + intervals;
-        self.gaps_s = [gap; KNOTS - 1];
+        self.leads = lead_s > 0.0 && intervals > 1;
+        let gap = if self.leads {
+            let gap = (span_s - lead_s) / (intervals - 1) as f64;
+            self.gaps_s = [gap; KNOTS - 1];
+            self.gaps_s[1] = lead_s;
+            gap
+        } else {
+            let gap = span_s / intervals as f64;
+            self.gaps_s = [gap; KNOTS - 1];
+            gap
+        };
+        debug_assert!(gap > 0.0, "a scan takes time");
         self.gaps_s[0] = first_gap;
-        let step = scaled(&old_motion, gap / old_span.max(1e-9));
-        self.guess_steps(&step);
+        self.guess_motion(&old_motion, old_span);
     }
 
-    /// Guesses the new knots evenly on the way to `end`.
+    /// Guesses the new knots evenly in time on the way to `end`.
     pub fn guess_end(&mut self, end: &Pose) {
         let motion = self.poses[1].inv_mul(end);
-        self.guess_steps(&scaled(&motion, 1.0 / (self.len - 2) as f64));
+        let span: f64 = self.gaps_s[1..self.len - 1].iter().sum();
+        self.guess_motion(&motion, span);
         self.poses[self.len - 1] = *end;
     }
 
@@ -138,8 +157,10 @@ impl Chain {
         }
     }
 
-    fn guess_steps(&mut self, step: &Pose) {
+    /// Guesses the new knots at the speed of a motion that took `span_s` seconds.
+    fn guess_motion(&mut self, motion: &Pose, span_s: f64) {
         for i in 2..self.len {
+            let step = scaled(motion, self.gaps_s[i - 1] / span_s.max(1e-9));
             self.poses[i] = self.poses[i - 1] * step;
             self.poses[i].rotation.renormalize();
         }
@@ -238,6 +259,12 @@ impl ChainSystem {
     /// Ties the speed after each knot to the speed before it.
     fn add_smoothness(&mut self, chain: &Chain, agility: &Agility) {
         for i in 1..chain.len - 1 {
+            let unusual = match i {
+                // At both ends of a time without scans.
+                1 | 2 if chain.leads => agility.between_scans,
+                1 => agility.between_scans,
+                _ => 1.0,
+            };
             let (before, after) = (chain.gaps_s[i - 1], chain.gaps_s[i]);
             let first = Step::between(&chain.poses[i - 1], &chain.poses[i]);
             let second = Step::between(&chain.poses[i], &chain.poses[i + 1]);
@@ -248,7 +275,7 @@ impl ChainSystem {
                 } else {
                     agility.acceleration
                 };
-                1.0 / (usual * time).powi(2)
+                1.0 / (usual * unusual * time).powi(2)
             });
             let jacobians = [
                 -first.by_earlier / before,
@@ -388,11 +415,11 @@ mod tests {
     fn with_nothing_seen_the_chain_goes_on_at_its_speed() {
         let mut chain = Chain::starting_at(Pose::identity());
         let step = Pose::new(Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, 0.0, 0.05));
-        chain.extend(1, 0.1);
+        chain.extend(0.0, 1, 0.1);
         chain.guess_end(&step);
         // As if a scan had fixed both knots well.
         chain.information = Information12::identity() * 1e6;
-        chain.extend(4, 0.1);
+        chain.extend(0.0, 4, 0.1);
         chain.information = Information12::identity() * 1e6;
         let mut system = ChainSystem::new();
         for _ in 0..5 {

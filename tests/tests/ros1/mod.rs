@@ -11,7 +11,9 @@ pub struct Message {
 }
 
 /// Fields of one record's header, and its data.
-fn records(bytes: &[u8]) -> Vec<(HashMap<String, Vec<u8>>, &[u8])> {
+type Record<'a> = (HashMap<String, Vec<u8>>, &'a [u8]);
+
+fn records(bytes: &[u8]) -> Vec<Record<'_>> {
     let mut rest = bytes;
     let mut block = || {
         let (len, after) = rest.split_first_chunk::<4>()?;
