@@ -255,11 +255,14 @@ fn shirt(frame: &CameraFrame, rgb: &[u8]) -> [f64; 3] {
 
 #[test]
 fn a_person_in_the_simulated_world_is_where_the_driver_says() {
-    let simulation = SimulationConfig::preset(Preset::Corridor, 1, 10.0);
+    let simulation = SimulationConfig {
+        people: [walker()].into(),
+        ..SimulationConfig::preset(Preset::Corridor, 1, 10.0)
+    };
     let config = CameraConfig::d455(WIDTH, HEIGHT, 0.2);
     let expected = config.geometry;
     let base_from_color = config.base_from_depth * expected.color_from_depth.inverse();
-    let camera = SimulatedCamera::new(&simulation, config, vec![walker()]);
+    let camera = SimulatedCamera::new(&simulation, config);
     let shown = Shown::default();
     let plugs = Plugs {
         camera: Rc::new(RefCell::new(camera)),

@@ -48,6 +48,7 @@ pub mod lidar;
 pub mod live;
 pub mod loops;
 pub mod material;
+mod moment;
 pub mod motion;
 mod noise;
 pub mod odometry;

@@ -1,8 +1,8 @@
 //! People who walk through a scene: where they are, what they wear, and the shapes of their bodies.
 //!
 //! In: for each person a list of visits, each a path walked in one outfit. Out: at any time, who is
-//! there, with a body of capsules and balls whose limbs swing with the steps. Elsewhere: what a camera
-//! sees of them (`camera`).
+//! there, with a body of capsules and balls whose limbs swing with the steps. Elsewhere: what lasers and
+//! cameras see of them (`moment`, `camera`).
 //!
 //! Proportions are those of an adult of 1.75 m (Winter, Biomechanics, 4th ed., figure 4.1), scaled to
 //! the person's height.
@@ -158,6 +158,7 @@ pub(crate) struct BodyHit {
 /// A body in the map.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
+    id: u32,
     parts: [Capsule; 14],
     /// A ball around all of it.
     centre: Vector,
@@ -228,6 +229,7 @@ impl Body {
             ball([-0.01, 0.0, 1.645], 0.105, person.hair),
         ];
         Self {
+            id: person.id,
             parts,
             centre: in_map(0.0, 0.0, 0.875),
             reach: (1.0 * scale) as f32,
@@ -253,6 +255,11 @@ impl Body {
             }
         }
         nearest
+    }
+
+    /// Whose it is.
+    pub fn id(&self) -> u32 {
+        self.id
     }
 
     /// The ball around it.

@@ -7,7 +7,7 @@ use hachi_hal::{Distortion, Intrinsics, Pose, RgbdGeometry, Stamp, Vector3};
 use hachi_world::camera::looking_ahead;
 use hachi_world::{
     CameraConfig, CameraFrame, Gait, Material, Outfit, Person, SceneBuilder, SimulatedCamera,
-    SimulationConfig, TrajectoryBuilder, Visit, preset::World,
+    Simulation, SimulationConfig, TrajectoryBuilder, Visit, preset::World,
 };
 
 const WIDTH: u32 = 160;
@@ -85,12 +85,19 @@ fn standing(id: u32, place: [f64; 2], outfit: Outfit) -> Person {
     }
 }
 
+fn with(simulation: &SimulationConfig, people: Vec<Person>) -> SimulationConfig {
+    SimulationConfig {
+        people: people.into(),
+        ..simulation.clone()
+    }
+}
+
 fn first_frame(
     simulation: &SimulationConfig,
     config: CameraConfig,
     people: Vec<Person>,
 ) -> CameraFrame {
-    let mut camera = SimulatedCamera::new(simulation, config, people);
+    let mut camera = SimulatedCamera::new(&with(simulation, people), config);
     camera.next_frame().unwrap().clone()
 }
 
@@ -260,7 +267,7 @@ fn people_walk_change_clothes_and_come_back() {
         ..standing(9, [0.0, 0.0], RED)
     };
     let simulation = room(false);
-    let mut camera = SimulatedCamera::new(&simulation, perfect(), vec![person]);
+    let mut camera = SimulatedCamera::new(&with(&simulation, vec![person]), perfect());
     let mut seen = Vec::new();
     while let Some(frame) = camera.next_frame() {
         let seconds = frame.stamp.secs_since(simulation.start);
@@ -302,7 +309,7 @@ fn a_walker_looks_where_they_go_and_swings_their_legs() {
         ..standing(1, [0.0, 0.0], RED)
     };
     let simulation = room(false);
-    let mut camera = SimulatedCamera::new(&simulation, perfect(), vec![person]);
+    let mut camera = SimulatedCamera::new(&with(&simulation, vec![person]), perfect());
     let mut widths = Vec::new();
     for _ in 0..40 {
         let frame = camera.next_frame().unwrap();
@@ -394,7 +401,7 @@ fn the_same_seed_gives_the_same_bytes_for_any_number_of_threads() {
             let simulation = SimulationConfig { seed, ..room(true) };
             let config = CameraConfig::d455(WIDTH, HEIGHT, 0.2);
             let people = vec![standing(1, [3.0, 0.5], RED)];
-            let mut camera = SimulatedCamera::new(&simulation, config, people);
+            let mut camera = SimulatedCamera::new(&with(&simulation, people), config);
             camera.skip_to(simulation.start + 1_000_000_000);
             let frame = camera.next_frame().unwrap();
             assert_eq!(frame.sequence, 31, "30 periods end 10 ns before the second");
@@ -411,13 +418,48 @@ fn the_same_seed_gives_the_same_bytes_for_any_number_of_threads() {
     assert!(one.0 != other.0 && one.1 != other.1 && one.2 == other.2);
 }
 
+/// Laser and camera see the same person at the same place.
+#[test]
+fn the_lidar_sees_the_people_too() {
+    let simulation = with(&room(true), vec![standing(7, [3.0, -1.0], RED)]);
+    let mut lidar = Simulation::new(simulation.clone());
+    let (mut on_person, mut others) = (Vec::new(), 0);
+    while let Some(packet) = lidar.next_packet() {
+        for truth in packet.truth {
+            match truth.person() {
+                Some(id) => {
+                    assert_eq!(id, 7);
+                    on_person.push(f64::from(truth.distance_m));
+                }
+                None => others += usize::from(truth.distance_m > 0.0),
+            }
+        }
+        if packet.stamp > simulation.start + 200_000_000 {
+            break;
+        }
+    }
+    // Two turns of 59 shots (0.6 m at 3 m, 0.2 degrees apart) in the 14 rings between shoes and
+    // crown would be 1,650 on a box as wide as the shoulders; a body fills about two thirds of it.
+    assert!(
+        (800..1_400).contains(&on_person.len()),
+        "{}",
+        on_person.len()
+    );
+    assert!(others > 10_000, "{others}");
+    let lidar_at = simulation.map_from_lidar(simulation.start).translation;
+    let away = (3.0 - lidar_at.x).hypot(-1.0 - lidar_at.y);
+    for distance in on_person {
+        assert!((distance - away).abs() < 0.6, "{distance} {away}");
+    }
+}
+
 #[test]
 fn frames_end_with_the_simulation() {
     let simulation = SimulationConfig {
         duration_s: 0.25,
         ..room(false)
     };
-    let mut camera = SimulatedCamera::new(&simulation, perfect(), Vec::new());
+    let mut camera = SimulatedCamera::new(&simulation, perfect());
     let mut stamps: Vec<Stamp> = Vec::new();
     while let Some(frame) = camera.next_frame() {
         stamps.push(frame.stamp);

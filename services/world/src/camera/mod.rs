@@ -1,7 +1,7 @@
 //! A RealSense-like camera on the robot: depth and colour of the scene and of the people in it, as
 //! the bytes that the camera sends, with the truth beside them.
 //!
-//! In: a simulation's scene, path and clock; optics; people. Out: Z16 and YUYV pictures, and for each
+//! In: a simulation's scene, people, path and clock; optics. Out: Z16 and YUYV pictures, and for each
 //! who is seen where: masks, boxes, places, identities, clothes. The same configuration gives the same
 //! bytes, for any number of threads.
 //!
@@ -112,7 +112,7 @@ pub struct CameraFrame {
 #[derive(Debug)]
 pub struct SimulatedCamera {
     config: CameraConfig,
-    people: Vec<Person>,
+    people: Arc<[Person]>,
     scene: Arc<Scene>,
     trajectory: Arc<Trajectory>,
     seed: u64,
@@ -122,21 +122,15 @@ pub struct SimulatedCamera {
     color_lens: Lens,
     next: u32,
     frame: CameraFrame,
-    bodies: Vec<(usize, Body)>,
+    bodies: Vec<Body>,
 }
 
-/// Masks number people in a byte.
+/// Masks number those who are there in a byte; more at once are not drawn.
 const MOST_PEOPLE: usize = 255;
 
 impl SimulatedCamera {
-    /// A camera on the robot of `simulation`, which it shares the scene, the path, the clock and
-    /// the seed with. People beyond the first 255 are left out.
-    pub fn new(
-        simulation: &SimulationConfig,
-        config: CameraConfig,
-        mut people: Vec<Person>,
-    ) -> Self {
-        people.truncate(MOST_PEOPLE);
+    /// A camera on the robot of `simulation`, whose scene, people, path, clock and seed it shares.
+    pub fn new(simulation: &SimulationConfig, config: CameraConfig) -> Self {
         let geometry = &config.geometry;
         let frame = CameraFrame {
             depth: vec![0; 2 * geometry.depth.pixels()],
@@ -155,19 +149,14 @@ impl SimulatedCamera {
             next: 0,
             frame,
             bodies: Vec::new(),
+            people: Arc::clone(&simulation.people),
             config,
-            people,
         }
     }
 
     /// Everything but what it sees.
     pub fn config(&self) -> &CameraConfig {
         &self.config
-    }
-
-    /// The people it may see.
-    pub fn people(&self) -> &[Person] {
-        &self.people
     }
 
     /// Where the depth camera truly is.
@@ -206,13 +195,14 @@ impl SimulatedCamera {
         self.frame.people.clear();
         let map_from_depth = self.map_from_depth(stamp);
         let map_from_color = map_from_depth * self.config.geometry.color_from_depth.inverse();
-        for (index, person) in self.people.iter().enumerate() {
-            let presence = person.presence(time_s, floor);
-            if let Some((presence, body)) = presence.and_then(|p| Some((p, person.body(&p)?))) {
-                self.bodies.push((index, body));
-                let truth = PersonTruth::new(person, &presence, &map_from_color);
-                self.frame.people.push(truth);
-            }
+        let there = self.people.iter().filter_map(|person| {
+            let presence = person.presence(time_s, floor)?;
+            Some((person, presence, person.body(&presence)?))
+        });
+        for (person, presence, body) in there.take(MOST_PEOPLE) {
+            self.bodies.push(body);
+            let truth = PersonTruth::new(person, &presence, &map_from_color);
+            self.frame.people.push(truth);
         }
         let view = render::View {
             scene: &self.scene,
@@ -238,7 +228,7 @@ impl SimulatedCamera {
         );
         let width = self.config.geometry.color.width;
         truth::find_visible(&frame.masks, width, &mut frame.people);
-        for (truth, (_, body)) in frame.people.iter_mut().zip(&self.bodies) {
+        for (truth, body) in frame.people.iter_mut().zip(&self.bodies) {
             let whole = view.whole(
                 &self.config.geometry.color,
                 &self.color_lens,

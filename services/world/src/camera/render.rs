@@ -69,7 +69,7 @@ struct Surface {
 /// What there is to see at one moment.
 pub(super) struct View<'a> {
     pub scene: &'a Scene,
-    pub bodies: &'a [(usize, Body)],
+    pub bodies: &'a [Body],
     pub seed: u64,
     pub frame: u64,
 }
@@ -184,7 +184,7 @@ impl View<'_> {
         let scene = self.behind_glass(ray, within);
         let reach = scene.as_ref().map_or(within, |(_, hit)| hit.distance);
         let mut nearest: Option<(u8, crate::person::BodyHit)> = None;
-        for (number, (_, body)) in self.bodies.iter().enumerate() {
+        for (number, body) in self.bodies.iter().enumerate() {
             let best = nearest.as_ref().map_or(reach, |(_, hit)| hit.distance);
             if let Some(hit) = body.cast(ray, best) {
                 // Masks have room for all that there can be.
