@@ -357,7 +357,7 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 19] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 20] = [
         ("canbus", canbus()),
         ("imu", imu()),
         ("realsense", realsense()),
@@ -409,6 +409,12 @@ fn main() -> Result<()> {
         ("submap", vec![submap_bytes()]),
         ("place_database", places().to_vec()),
         ("map_file", vec![map_file()?]),
+        (
+            "detector_outputs",
+            (0..4)
+                .map(|kind| with_switches(kind, leg_numbers()))
+                .collect(),
+        ),
         (
             "mot_text",
             vec![

@@ -156,8 +156,14 @@ const LAYERS: &[Layer] = &[
         because: "errors are measured on poses, whoever estimated them",
     },
     Layer {
-        name: "hachi-people",
+        name: "hachi-inference",
         sees: &[],
+        tests_see: &[],
+        because: "a network turns numbers into numbers: what they mean is not its business",
+    },
+    Layer {
+        name: "hachi-people",
+        sees: &["hachi-inference"],
         tests_see: &[],
         because: "people are followed in any images: usable by someone who has never heard of this robot",
     },

@@ -6,6 +6,7 @@ pub mod graph;
 pub mod loops;
 pub mod map;
 pub mod mapping;
+pub mod model;
 pub mod people;
 pub mod service;
 
@@ -59,6 +60,9 @@ pub enum Command {
     /// Follow people in images.
     #[command(subcommand)]
     People(people::People),
+    /// Check neural networks.
+    #[command(subcommand)]
+    Model(model::Model),
     /// Check what is installed, what can be opened, and what rights hachi has here.
     Doctor(DoctorArguments),
 }

@@ -9,6 +9,7 @@ pub mod eval_tracks;
 pub mod eval_trajectory;
 pub mod graph_optimize;
 pub mod map;
+pub mod model;
 pub mod people;
 pub mod replay;
 pub mod run;
@@ -38,6 +39,7 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
         Command::Map(command) => map::run(&command),
         Command::Graph(Graph::Optimize(arguments)) => graph_optimize::run(&arguments),
+        Command::Model(command) => model::run(&command),
         Command::People(command) => people::run(&command),
         Command::Doctor(arguments) => doctor::run(&arguments),
     }

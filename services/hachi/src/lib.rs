@@ -17,6 +17,8 @@
 //! | [`service`] | the service on a robot, task by task |
 //! | [`config`] | settings |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
+//! | [`images`] | folders of images |
+//! | [`networks`] | which networks find people and tell them apart |
 //! | [`mot_files`] | files of boxes and tracks |
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
@@ -28,6 +30,7 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod exit;
+pub mod images;
 pub mod interrupt;
 pub mod latency;
 pub mod leg_samples;
@@ -37,6 +40,7 @@ pub mod map_picture;
 pub mod mapping;
 pub mod mot_files;
 pub mod motion_samples;
+pub mod networks;
 pub mod output;
 pub mod precision_recall_picture;
 pub mod progress;

@@ -93,3 +93,136 @@ fn metrics_of_a_real_result_are_the_published_ones() {
     assert!((metrics["mota"].as_f64().unwrap() - 0.526).abs() < 5e-4);
     assert!((metrics["idf1"].as_f64().unwrap() - 0.558).abs() < 5e-4);
 }
+
+/// A folder of frames: three of a real sequence.
+fn real_frames(people: &std::path::Path, folder: &std::path::Path) {
+    let from = people.join("MOT17-mini/train/MOT17-04-FRCNN/img1");
+    for name in ["000001.jpg", "000002.jpg", "000003.jpg"] {
+        std::fs::copy(from.join(name), folder.join(name)).unwrap();
+    }
+}
+
+#[test]
+fn people_in_real_images_keep_their_numbers() {
+    let Some(people) = recording("people") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let frames = folder.path().join("frames");
+    std::fs::create_dir(&frames).unwrap();
+    real_frames(&people, &frames);
+    // What is no image costs one frame, and is said.
+    std::fs::write(frames.join("000004.jpg"), b"\xFF\xD8 cut short").unwrap();
+    let tracks = folder.path().join("tracks.txt");
+    let run = run(&[
+        "people",
+        "track",
+        text(&frames),
+        "--out",
+        text(&tracks),
+        "--fps",
+        "30",
+        "--json",
+        "--log",
+        "error",
+    ]);
+    let out = run.json();
+    assert_eq!((&out["frames"], &out["unreadable"]), (&4.into(), &1.into()));
+    let truth = people.join("MOT17-mini/train/MOT17-04-FRCNN/gt/gt.txt");
+    let metrics = program::run(&[
+        "eval",
+        "tracks",
+        "--reference",
+        text(&truth),
+        "--estimate",
+        text(&tracks),
+        "--json",
+    ])
+    .json();
+    assert_eq!(metrics["ids"], 0);
+    assert!(metrics["precision"].as_f64().unwrap() > 0.8, "{metrics}");
+    // Three frames make only the surest a person.
+    assert!(out["people"].as_u64().unwrap() >= 3, "{out}");
+}
+
+#[test]
+fn the_person_of_a_picture_is_found_and_nobody_else() {
+    let Some(people) = recording("people") else {
+        return;
+    };
+    let search = people.join("person_search");
+    let frames = search.join("data/samples");
+    let names = program::names(&frames);
+    let folder = tempfile::tempdir().unwrap();
+    for name in names.iter().step_by(5) {
+        std::fs::copy(frames.join(name), folder.path().join(name)).unwrap();
+    }
+    let query = search.join("query/0001_c1s1_001051_00.jpg");
+    let out = run(&[
+        "people",
+        "find",
+        "--query",
+        text(&query),
+        text(folder.path()),
+        "--json",
+    ])
+    .json();
+    let sightings = out["frames"].as_array().unwrap();
+    assert_eq!(sightings.len(), 4);
+    assert_eq!(out["found"], 4, "{out}");
+    // Searched for in frames of other people, nobody is found.
+    let strangers = tempfile::tempdir().unwrap();
+    real_frames(&people, strangers.path());
+    let out = run(&[
+        "people",
+        "find",
+        text(strangers.path()),
+        "--query",
+        text(&query),
+        "--json",
+    ])
+    .json();
+    assert_eq!(out["found"], 0, "{out}");
+}
+
+#[test]
+fn a_model_is_checked_against_its_manifest() {
+    let Some(models) = recording("models") else {
+        return;
+    };
+    let model = models.join("osnet_x0_25_msmt17.onnx");
+    let out = run(&["model", "check", text(&model), "--json"]).json();
+    assert_eq!(out["input"], "\"input\" [any, 3, 256, 128]");
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = include_str!("../../inference/src/known/osnet_x0_25_msmt17.toml");
+    let wrong = file(folder.path(), "wrong.toml", &manifest.replace("512", "256"));
+    let failed = run(&["model", "check", text(&model), "--manifest", text(&wrong)]);
+    let line = failed.failure();
+    assert!(
+        line.contains("expects [1, 256]") && line.contains("[any, 512]"),
+        "{line}"
+    );
+    let timed = run(&["model", "bench", text(&model), "--runs", "2", "--json"]).json();
+    assert_eq!(timed["runs"], 2);
+    assert!(timed["median_ms"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn without_a_network_it_is_said_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("1.jpg"), b"x").unwrap();
+    let failed = run(&[
+        "people",
+        "track",
+        text(folder.path()),
+        "--models",
+        text(folder.path()),
+        "--out",
+        text(&folder.path().join("t.txt")),
+    ]);
+    assert!(
+        failed.failure().contains("holds no detector"),
+        "{}",
+        failed.stderr
+    );
+}

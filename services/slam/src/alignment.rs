@@ -27,7 +27,7 @@ const FINE_AT_ONCE: usize = 2;
 const WORTH: f64 = 0.6;
 /// A direction of which the surfaces say less than this share of what they say of the best one is
 /// left to the guess: see `hachi_registration::Degeneracy`.
-const OPEN_SHARE: f64 = 0.003;
+pub(crate) const OPEN_SHARE: f64 = 0.003;
 /// Points handed to one task: fixed, for the same sums with any number of threads.
 const CHUNK: usize = 256;
 /// Cosine between normals that lie on one surface.

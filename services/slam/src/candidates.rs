@@ -13,7 +13,7 @@ use crate::ledger::FoundBy;
 use crate::map::Map;
 use crate::node::{Node, NodeId, PieceId};
 use crate::places::node_of;
-use crate::recognition::Recognition;
+use crate::recognition::{PlaceId, Recognition};
 
 /// Half axes of the search ellipsoid where the place is known exactly, metres: what one sees from
 /// there, one sees from here.
@@ -50,6 +50,8 @@ pub struct Candidate {
     pub looks: Option<Match>,
     /// Where somebody says that it is: `candidate_from_node`.
     pub proposed: Option<Pose>,
+    /// The place that is asked again, of those where a piece may lie.
+    pub place: Option<PlaceId>,
 }
 
 /// The candidates for a node that was described last, the most promising first.
@@ -70,6 +72,7 @@ pub fn candidates(map: &mut Map, id: NodeId, config: &SlamConfig, out: &mut Vec<
                 found_by: FoundBy::Nearness,
                 looks: None,
                 proposed: None,
+                place: None,
             });
         }
     }
@@ -79,8 +82,8 @@ pub fn candidates(map: &mut Map, id: NodeId, config: &SlamConfig, out: &mut Vec<
 /// nodes of other pieces that look alike, one for each place, most alike first.
 pub fn recognised(map: &Map, node: &Node, recognition: &mut Recognition, out: &mut Vec<Candidate>) {
     out.clear();
-    let places: Vec<(PieceId, Pose)> = recognition.places().collect();
-    for (place, (target, target_from_piece)) in places.into_iter().enumerate() {
+    let places: Vec<(PlaceId, PieceId, Pose)> = recognition.places().collect();
+    for (place, target, target_from_piece) in places {
         let target_from_node = target_from_piece * node.map_from_node;
         match closest(map, target, &target_from_node) {
             Some(old) => out.push(Candidate {
@@ -88,6 +91,7 @@ pub fn recognised(map: &Map, node: &Node, recognition: &mut Recognition, out: &m
                 found_by: FoundBy::Recognition,
                 looks: None,
                 proposed: Some(old.map_from_node.inv_mul(&target_from_node)),
+                place: Some(place),
             }),
             None => recognition.leads_off_the_map(node.id, place),
         }
@@ -106,6 +110,7 @@ pub fn recognised(map: &Map, node: &Node, recognition: &mut Recognition, out: &m
                 found_by: FoundBy::Recognition,
                 looks: Some(found),
                 proposed: None,
+                place: None,
             });
         }
     }
@@ -154,6 +159,7 @@ fn alike(
                 found_by: FoundBy::Looks,
                 looks: Some(found),
                 proposed: None,
+                place: None,
             });
         }
     }

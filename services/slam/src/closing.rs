@@ -178,7 +178,9 @@ impl Closing {
         if fitness.inlier_share() < config.loop_least_inliers {
             return Err(Refusal::PoorFit);
         }
-        if found.degeneracy.rotations > 0 || found.degeneracy.translations > 1 {
+        // Where odometry says nothing of it, a place along an open direction is the guess's.
+        let most_open = usize::from(same_piece);
+        if found.degeneracy.rotations > 0 || found.degeneracy.translations > most_open {
             return Err(Refusal::Unobserved);
         }
         Ok(Proven {

@@ -20,6 +20,8 @@ pub enum SlamDoubt {
         /// Nodes that agree on it.
         agreeing: usize,
     },
+    /// One place has won, and what is seen at this moment does not lie on the map there yet.
+    NotSeen,
     /// No loop has been closed for so long that drift may be large.
     Drift {
         /// Standard deviation of the position on the map, metres.
@@ -81,6 +83,9 @@ impl fmt::Display for SlamDoubt {
             Self::Unconfirmed { agreeing } => {
                 write!(f, "a known place fits, {agreeing} submaps agree so far")
             }
+            Self::NotSeen => f.write_str(
+                "a known place was recognised, but what is seen now does not lie on the map there yet",
+            ),
             Self::Drift { sigma_m } => {
                 write!(
                     f,

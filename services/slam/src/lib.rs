@@ -9,6 +9,7 @@ pub mod closing;
 pub mod codec;
 pub mod condition;
 pub mod config;
+pub mod confirmation;
 pub mod edge;
 pub mod graph;
 pub mod grid;

@@ -131,13 +131,13 @@ fn prove(
         match closing.judge(&mut entry, candidate, &aligned, same_piece, config) {
             Err(refusal) => {
                 if !same_piece {
-                    recognition.vote(map, &entry, None);
+                    recognition.vote(map, candidate, &entry, None);
                 }
                 entry.verdict = Verdict::Refused(refusal);
                 map.close_entry(entry);
             }
             Ok(proven) if !same_piece => {
-                recognition.vote(map, &entry, Some(proven.information));
+                recognition.vote(map, candidate, &entry, Some(proven.information));
                 map.close_entry(entry);
             }
             Ok(mut proven) => {

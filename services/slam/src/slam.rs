@@ -9,6 +9,7 @@ use nalgebra::Matrix6;
 
 use crate::condition::{SlamCondition, SlamDoubt};
 use crate::config::SlamConfig;
+use crate::confirmation::Confirmation;
 use crate::graph::GraphError;
 use crate::growing::{Growing, GrownSubmap};
 use crate::input::{ScanInput, SlamEstimate, SlamEvents};
@@ -49,6 +50,7 @@ pub struct Slam {
     broken: bool,
     /// The present scans hang on no node: the first submap since odometry broke has not become one.
     adrift: bool,
+    confirmation: Confirmation,
 }
 
 impl Slam {
@@ -66,6 +68,7 @@ impl Slam {
             covariance: Matrix6::identity() * 1e-6,
             broken: false,
             adrift: false,
+            confirmation: Confirmation::default(),
             config,
         }
     }
@@ -91,7 +94,9 @@ impl Slam {
 
     /// Whether [`Slam::step`] will look at the points of a scan that odometry placed here.
     pub fn wants_points(&self, odom_from_base: &Pose, condition: &Condition) -> bool {
-        self.up.is_none() || self.growing.joins(odom_from_base, condition)
+        self.up.is_none()
+            || self.confirmation.is_due()
+            || self.growing.joins(odom_from_base, condition)
     }
 
     /// One scan; `events` is emptied first.
@@ -122,7 +127,26 @@ impl Slam {
             _ => STEPS_BEHIND,
         };
         self.work(steps, events);
+        self.confirm(scan, events);
         self.estimate(scan)
+    }
+
+    /// A place that was just recognised is believed once what is seen now lies on the map there.
+    fn confirm(&mut self, scan: &ScanInput<'_>, events: &SlamEvents) {
+        // The next scan has points.
+        let just_joined = !events.joined.is_empty();
+        if !self.confirmation.is_due()
+            || just_joined
+            || self.adrift
+            || self.workshop.is_floating(&self.map)
+        {
+            return;
+        }
+        self.confirmation.count(events.fixed.len());
+        let map_from_base = self.map_from_odom * scan.odom_from_base;
+        let session = self.workshop.session();
+        self.confirmation
+            .look(&mut self.map, &map_from_base, session, scan.points);
     }
 
     /// The end of a run: fixes what has grown, checks what is to be checked, keeps everything.
@@ -244,6 +268,9 @@ impl Slam {
                 Work::Going => {}
                 Work::Moved => self.take_over(),
             }
+            if !events.joined.is_empty() {
+                self.confirmation.demand();
+            }
         }
     }
 
@@ -293,6 +320,9 @@ impl Slam {
                 }),
                 agreeing => SlamCondition::Recovering(SlamDoubt::Unconfirmed { agreeing }),
             };
+        }
+        if self.confirmation.is_due() {
+            return SlamCondition::Recovering(SlamDoubt::NotSeen);
         }
         (*odometry).into()
     }

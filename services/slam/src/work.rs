@@ -124,6 +124,7 @@ impl Workshop {
             found_by: FoundBy::Proposal,
             looks: None,
             proposed: Some(*candidate_from_node),
+            place: None,
         };
         self.proposed.push_back((node, candidate));
     }
@@ -353,14 +354,15 @@ impl Workshop {
             Ok(proven) => proven,
             Err(refusal) => {
                 if recognising {
-                    self.recognition.vote(map, &entry, None);
+                    self.recognition.vote(map, &candidate, &entry, None);
                 }
                 refuse(map, entry, refusal, events);
                 return Work::Going;
             }
         };
         if recognising {
-            self.recognition.vote(map, &entry, Some(proven.information));
+            let known = Some(proven.information);
+            self.recognition.vote(map, &candidate, &entry, known);
             map.close_entry(entry);
             events.ledger.push(entry);
             return Work::Going;

@@ -13,6 +13,7 @@
 //! | [`motion`], [`trajectory`] | where the robot is at any time |
 //! | [`sensor`] | which sensors there are, and when their lasers fire |
 //! | [`simulation`], [`lidar`] | packet after packet; as a [`hachi_hal::PacketSource`] |
+//! | [`camera`], [`person`] | depth and colour pictures; the people in them |
 //! | [`imu`], [`odometry`] | the other sensors |
 //! | [`legs`] | joints, feet and body of a quadruped that walks the path |
 //! | [`commanded`], [`live`] | a quadruped that goes where it is told; the sensor on it |
@@ -33,6 +34,7 @@
 mod aim;
 mod building;
 mod calendar;
+pub mod camera;
 mod campus;
 pub mod capture;
 pub mod commanded;
@@ -46,11 +48,13 @@ pub mod lidar;
 pub mod live;
 pub mod loops;
 pub mod material;
+mod moment;
 pub mod motion;
 mod noise;
 pub mod odometry;
 pub mod optics;
 mod path;
+pub mod person;
 pub mod preset;
 pub mod returns;
 pub mod scene;
@@ -61,6 +65,7 @@ mod smooth;
 pub mod trajectory;
 mod vlp16;
 
+pub use camera::{CameraConfig, CameraFrame, PersonTruth, PixelBox, SimulatedCamera};
 pub use capture::{CaptureError, CaptureWriter, write_pcap, write_tum};
 pub use commanded::CommandedBody;
 pub use floor::{Floor, RaisedFloor, Terrain, Wave};
@@ -73,6 +78,7 @@ pub use material::{Finish, Material};
 pub use motion::{Axis, BodyMotion, Harmonic};
 pub use odometry::{OdometryConfig, SimulatedOdometry};
 pub use optics::ReturnLabel;
+pub use person::{Outfit, Person, Visit};
 pub use preset::{Preset, World};
 pub use returns::ReturnTruth;
 pub use scene::{ObjectId, Role, Scene};

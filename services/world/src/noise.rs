@@ -12,6 +12,7 @@ pub(crate) enum Purpose {
     Odometry = 4,
     Strays = 5,
     Legs = 6,
+    Camera = 7,
 }
 
 /// A generator of its own for `purpose` and the `index`-th thing of that purpose.

@@ -15,7 +15,8 @@ use parry3d::math::Vector;
 use parry3d::query::Ray;
 
 use crate::material::{Finish, Material, mirrored_share};
-use crate::scene::{Hit, ObjectId, Role, Scene};
+use crate::moment::Moment;
+use crate::scene::{Hit, ObjectId, Role};
 
 /// What a return truly is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -189,7 +190,7 @@ pub(crate) enum Wanted {
 /// Adds the echoes of a pulse of strength `gain` within `max_range` to `echoes`. `first_hit` is
 /// what the pulse hits first within that range.
 pub(crate) fn trace(
-    scene: &Scene,
+    moment: Moment<'_>,
     ray: Ray,
     first_hit: Option<Hit>,
     gain: f32,
@@ -208,7 +209,7 @@ pub(crate) fn trace(
         seen: Seen::Straight,
         depth: 0,
     };
-    let mut met = (first, hit, scatter(scene, &first, &hit));
+    let mut met = (first, hit, scatter(moment, &first, &hit));
     echoes.push(met.2.echo);
     // Half the least power is the least that luck lets a sensor detect.
     let mut to_beat = MIN_POWER / 2.0;
@@ -224,7 +225,7 @@ pub(crate) fn trace(
             to_beat = to_beat.max(scattered.echo.power);
         }
         if branch.depth < MAX_DEPTH {
-            for next in onward(scene, branch, hit, scattered) {
+            for next in onward(moment, branch, hit, scattered) {
                 if next.gain > MIN_GAIN {
                     stack[waiting] = next;
                     waiting += 1;
@@ -238,13 +239,13 @@ pub(crate) fn trace(
             waiting -= 1;
             let branch = stack[waiting];
             // Whatever this branch meets is at least so far away and at best so bright.
-            let best = branch.gain * scene.brightest() / (branch.travelled * branch.travelled);
+            let best = branch.gain * moment.brightest() / (branch.travelled * branch.travelled);
             if best < to_beat {
                 continue;
             }
             let within = max_range - branch.travelled;
-            if let Some(hit) = scene.cast(&branch.ray, within, branch.ignore) {
-                break (branch, hit, scatter(scene, &branch, &hit));
+            if let Some(hit) = moment.cast(&branch.ray, within, branch.ignore) {
+                break (branch, hit, scatter(moment, &branch, &hit));
             }
         };
         echoes.push(met.2.echo);
@@ -260,8 +261,8 @@ struct Scattered {
     passed: f32,
 }
 
-fn scatter(scene: &Scene, branch: &Branch, hit: &Hit) -> Scattered {
-    let object = scene.object(hit.object);
+fn scatter(moment: Moment<'_>, branch: &Branch, hit: &Hit) -> Scattered {
+    let object = moment.object(hit.object);
     let material = &object.material;
     let distance = branch.travelled + hit.distance;
     let cosine = hit.normal.dot(branch.ray.dir).abs().min(1.0);
@@ -321,9 +322,9 @@ fn darkening(material: &Material, cosine: f32) -> f32 {
 
 /// Where the light goes on from a surface, in the mirror and beyond it, the stronger branch last:
 /// it is followed first.
-fn onward(scene: &Scene, branch: &Branch, hit: &Hit, scattered: &Scattered) -> [Branch; 2] {
+fn onward(moment: Moment<'_>, branch: &Branch, hit: &Hit, scattered: &Scattered) -> [Branch; 2] {
     let (mirrored, passed) = (scattered.mirrored, scattered.passed);
-    let role = scene.object(hit.object).role;
+    let role = moment.object(hit.object).role;
     let point = branch.ray.point_at(hit.distance);
     let next = Branch {
         travelled: scattered.echo.distance,
@@ -368,13 +369,15 @@ pub(crate) fn beam(origin: [f64; 3], direction: [f64; 3]) -> Ray {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
     use crate::scene_builder::SceneBuilder;
 
     fn echoes_of(scene: &Scene, origin: [f64; 3], direction: [f64; 3]) -> Vec<Echo> {
         let mut echoes = Echoes::new();
         let ray = beam(origin, direction);
         let hit = scene.cast(&ray, 100.0, None);
-        trace(scene, ray, hit, 1.0, 100.0, Wanted::Every, &mut echoes);
+        let moment = Moment { scene, bodies: &[] };
+        trace(moment, ray, hit, 1.0, 100.0, Wanted::Every, &mut echoes);
         echoes.as_slice().to_vec()
     }
 
@@ -456,8 +459,12 @@ mod tests {
             let ray = beam([1.0, 0.1, 0.6], [azimuth.cos(), azimuth.sin(), up]);
             let dir = ray.dir.normalize();
             let ray = Ray::new(ray.origin, dir);
+            let moment = Moment {
+                scene: &world.scene,
+                bodies: &[],
+            };
             let hit = world.scene.cast(&ray, 100.0, None);
-            trace(&world.scene, ray, hit, 1.0, 100.0, wanted, &mut echoes);
+            trace(moment, ray, hit, 1.0, 100.0, wanted, &mut echoes);
             echoes
                 .as_slice()
                 .iter()

@@ -6,6 +6,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::moment::FIRST_PERSON;
 use crate::noise::{Purpose, generator, normals};
 use crate::optics::{Echo, MIN_POWER, MIN_RANGE_M, ReturnLabel};
 use crate::scene::ObjectId;
@@ -17,10 +18,18 @@ use crate::simulation::NoiseConfig;
 pub struct ReturnTruth {
     /// What the return is.
     pub label: ReturnLabel,
-    /// What scattered the light back; 0 where there is no return or a stray one.
+    /// What scattered the light back; 0 where there is no return or a stray one. People are not
+    /// among the scene's objects: see [`ReturnTruth::person`].
     pub object: ObjectId,
     /// Length of the light's path without noise or rounding, metres; 0 where there is no return.
     pub distance_m: f32,
+}
+
+impl ReturnTruth {
+    /// Who scattered the light back, if it was somebody.
+    pub fn person(&self) -> Option<u32> {
+        self.object.checked_sub(FIRST_PERSON)
+    }
 }
 
 /// What the sensor reports of one channel.

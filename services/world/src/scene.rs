@@ -149,7 +149,7 @@ fn box_normal(bounds: &Aabb, ray: &Ray) -> Vector {
 }
 
 /// Distance at which a ray from outside enters a ball.
-fn ball_hit(centre: Vector, radius: f32, ray: &Ray) -> Option<f32> {
+pub(crate) fn ball_hit(centre: Vector, radius: f32, ray: &Ray) -> Option<f32> {
     let to_centre = centre - ray.origin;
     let along = to_centre.dot(ray.dir);
     // From the foot of the perpendicular, not from the squares of long distances.

@@ -14,8 +14,10 @@ use rand::RngExt;
 use crate::aim::{Head, LASERS};
 use crate::calendar::Utc;
 use crate::fan::Scratch;
+use crate::moment::Moment;
 use crate::noise::{Purpose, generator, uniform_pair};
 use crate::optics::{Echoes, trace};
+use crate::person::Body;
 use crate::returns::{Measurement, Report, ReturnTruth, Strays, dual_of, strongest_of};
 use crate::scene::Hit;
 use crate::simulation::SimulationConfig;
@@ -177,6 +179,7 @@ struct Casting {
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     scratch: Scratch,
+    bodies: Vec<Body>,
 }
 
 impl DataPacket {
@@ -234,8 +237,17 @@ pub(crate) fn make_packet_at(
         rays,
         hits,
         scratch,
+        bodies,
     } = casting;
     scene.cast_fans(rays, head.rays(), MAX_RANGE_M, scratch, hits);
+    // In the 1.3 ms of a packet nobody walks further than 3 mm.
+    config.bodies_at(begins_ns as f64 * 1e-9, bodies);
+    let moment = Moment { scene, bodies };
+    if !bodies.is_empty() {
+        for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
+            *hit = moment.nearer(ray, MAX_RANGE_M, *hit);
+        }
+    }
     let mut echoes = Echoes::new();
     for group in 0..sensor.groups() {
         for laser in 0..LASERS {
@@ -244,7 +256,7 @@ pub(crate) fn make_packet_at(
                 let ray = head.rays() * group + ray;
                 let (gain, wanted) = (head.gain, head.wanted);
                 trace(
-                    scene,
+                    moment,
                     rays[ray],
                     hits[ray],
                     gain,

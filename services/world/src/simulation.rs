@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use crate::helios;
 use crate::imu::{ImuConfig, SimulatedImu};
 use crate::odometry::{OdometryConfig, SimulatedOdometry};
+use crate::person::{Body, Person};
 use crate::preset::{Preset, World};
 use crate::returns::ReturnTruth;
 use crate::scene::Scene;
@@ -78,6 +79,8 @@ impl Default for NoiseConfig {
 pub struct SimulationConfig {
     /// What stands where.
     pub scene: Arc<Scene>,
+    /// Who walks there.
+    pub people: Arc<[Person]>,
     /// Where the robot is.
     pub trajectory: Arc<Trajectory>,
     /// Which sensor it carries.
@@ -106,6 +109,7 @@ impl SimulationConfig {
     pub fn new(world: World, seed: u64, duration_s: f64) -> Self {
         Self {
             scene: Arc::new(world.scene),
+            people: Arc::new([]),
             trajectory: Arc::new(world.trajectory),
             sensor: SensorKind::Vlp16,
             base_from_lidar: Pose::from_parts(
@@ -134,6 +138,16 @@ impl SimulationConfig {
     /// When the simulation ends.
     pub fn end(&self) -> Stamp {
         self.start + self.duration_ns()
+    }
+
+    /// Everybody who is there at a time, seconds after the start.
+    pub(crate) fn bodies_at(&self, time_s: f64, bodies: &mut Vec<Body>) {
+        bodies.clear();
+        let floor = self.scene.floor();
+        bodies.extend(self.people.iter().filter_map(|person| {
+            let presence = person.presence(time_s, floor)?;
+            person.body(&presence)
+        }));
     }
 
     fn seconds(&self, stamp: Stamp) -> f64 {

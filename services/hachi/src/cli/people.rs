@@ -10,30 +10,78 @@ use clap::{Args, Subcommand};
 pub enum People {
     /// Follow everyone from frame to frame.
     Track(PeopleTrackArguments),
+    /// Find the person of some pictures in other images.
+    Find(PeopleFindArguments),
+}
+
+/// Which networks to use.
+#[derive(Debug, Clone, Args)]
+pub struct NetworkArguments {
+    /// Folder of ONNX models with their manifests [default: HACHI_MODELS, else models in HACHI_DATA].
+    #[arg(long, value_name = "DIR")]
+    pub models: Option<PathBuf>,
+    /// The network that finds people [default: the first detector in the folder].
+    #[arg(long, value_name = "FILE.onnx")]
+    pub detector: Option<PathBuf>,
+    /// The network that tells people apart [default: the first one in the folder].
+    #[arg(long, value_name = "FILE.onnx")]
+    pub reid: Option<PathBuf>,
 }
 
 /// Arguments of `hachi people track`.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\
-INPUT is a file of MOTChallenge detections (frame, id, left, top, width, height, score), or a folder of \
-frames with such a file in --detections. The result has one line for each person in each frame; people \
-are followed from the frame in which they were first seen, and gaps of up to a second are filled.
+INPUT is a folder of JPEG or PNG frames, in which people are found by a network, or a file of \
+MOTChallenge detections (frame, id, left, top, width, height, score). The result has one line for each \
+person in each frame; people are followed from the frame in which they were first seen, and gaps of up \
+to a second are filled.
 
 Example:
+  hachi people track frames --models models --out tracks.txt
   hachi people track TUD-Campus/det/det.txt --out campus.txt")]
 pub struct PeopleTrackArguments {
-    /// Detections, or the folder they belong to.
+    /// Frames, or detections.
     #[arg(value_name = "INPUT")]
     pub input: PathBuf,
     /// File for the tracks, in MOTChallenge's format.
     #[arg(long, value_name = "FILE.txt")]
     pub out: PathBuf,
-    /// Detections of the frames in INPUT.
+    /// Detections of the frames in INPUT: no network is run then.
     #[arg(long, value_name = "FILE")]
     pub detections: Option<PathBuf>,
     /// Frames a second [default: what seqinfo.ini beside them says, else 10].
     #[arg(long, value_name = "N", value_parser = frames_per_second)]
     pub fps: Option<f64>,
+    /// The networks for frames.
+    #[command(flatten)]
+    pub networks: NetworkArguments,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `hachi people find`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Pictures of the person are crops, or images in which the largest person is meant. In each frame of \
+INPUT, a folder of images or one image, the person who looks most like them is found, unless nobody \
+looks alike enough.
+
+Example:
+  hachi people find --query anna1.jpg anna2.jpg frames --json")]
+pub struct PeopleFindArguments {
+    /// Pictures of the person; where INPUT does not stand before, the last one is INPUT.
+    #[arg(long, value_name = "IMG", required = true, num_args = 1..)]
+    pub query: Vec<PathBuf>,
+    /// A folder of images, or one.
+    #[arg(value_name = "INPUT")]
+    pub input: Option<PathBuf>,
+    /// How far features of one person may lie apart (1 - cosine) [default: what the manifest says].
+    #[arg(long, value_name = "DISTANCE")]
+    pub max_distance: Option<f64>,
+    /// The networks.
+    #[command(flatten)]
+    pub networks: NetworkArguments,
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,

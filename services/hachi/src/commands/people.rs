@@ -1,5 +1,6 @@
 //! `hachi people`: one module for each of its commands.
 
+mod find;
 mod track;
 
 use crate::cli::people::People;
@@ -11,6 +12,7 @@ use crate::exit::Failure;
 /// What the command could not do, and what the user can.
 pub fn run(command: &People) -> Result<(), Failure> {
     match command {
+        People::Find(arguments) => find::run(arguments),
         People::Track(arguments) => track::run(arguments),
     }
 }

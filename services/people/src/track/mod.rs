@@ -17,4 +17,4 @@ mod tracker;
 
 pub use image_motion::{ImageMotion, Pinhole};
 pub use single::{Track, TrackState};
-pub use tracker::{Detection, Features, Frame, Tracker, TrackerConfig};
+pub use tracker::{Detection, Features, Frame, LEAST_SHARE, Tracker, TrackerConfig};

@@ -27,10 +27,13 @@ pub struct Features<'a> {
 }
 
 impl<'a> Features<'a> {
-    fn of(&self, detection: usize) -> Option<&'a [f32]> {
+    /// The feature of a detection; `None` if there is none.
+    pub fn get(&self, detection: usize) -> Option<&'a [f32]> {
         let begin = detection.checked_mul(self.dimension)?;
         let feature = self.values.get(begin..begin.checked_add(self.dimension)?)?;
-        (!feature.is_empty() && feature.iter().all(|v| v.is_finite())).then_some(feature)
+        // Zeros stand for nobody seen.
+        (feature.iter().all(|v| v.is_finite()) && feature.iter().any(|v| *v != 0.0))
+            .then_some(feature)
     }
 }
 
@@ -69,7 +72,7 @@ impl Default for TrackerConfig {
 }
 
 /// Detections with less of [`TrackerConfig::even_score`] than this share are not looked at.
-const LEAST_SHARE: f64 = 0.2;
+pub const LEAST_SHARE: f64 = 0.2;
 /// A track is believed once it was seen in so many frames, as SORT has it,
 const BELIEVED_HITS: u32 = 3;
 /// and once the evidence (log odds) says fifty to one.
@@ -199,7 +202,7 @@ impl Tracker {
             for (column, &d) in self.open_detections.iter().enumerate() {
                 let (track, detection) = (&self.tracks[t], &frame.detections[d]);
                 let look = frame.features.and_then(|features| {
-                    let distance = track.appearance_distance(features.of(d)?)?;
+                    let distance = track.appearance_distance(features.get(d)?)?;
                     Some(distance / features.same_person_distance)
                 });
                 self.costs
@@ -285,7 +288,7 @@ fn seen(track: &mut Track, d: usize, frame: &Frame<'_>, even_score: f64) {
     if track.hits >= BELIEVED_HITS && track.evidence >= BELIEVED_EVIDENCE {
         track.state = TrackState::Confirmed;
     }
-    if let Some(feature) = frame.features.and_then(|features| features.of(d)) {
+    if let Some(feature) = frame.features.and_then(|features| features.get(d)) {
         track.learn(feature);
     }
 }

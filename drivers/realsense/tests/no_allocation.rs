@@ -1,0 +1,97 @@
+//! Once a camera streams, frames cost no allocation: from the kernel's buffers to aligned depth.
+#![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
+
+mod camera;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use camera::{Act, Camera, PIXELS, Plugged, frame_bytes, metadata_bytes};
+use hachi_hal::{RgbdCamera, RgbdImages, Stamp};
+use hachi_realsense::align::depth_to_color;
+use hachi_realsense::device::{Part, Stream};
+use hachi_realsense::{RealSense, RealSenseConfig};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is handed to the system's allocator unchanged; counting touches no memory.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(at, layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Pairs with everything that can happen to them: late colour, missing pictures, missing metadata.
+fn acts() -> Vec<Act> {
+    let mut acts = Vec::new();
+    for n in 0..40_u32 {
+        let us = 1_000_000 + n * 33_333;
+        for stream in Stream::BOTH {
+            let act = |part, bytes| Act::Buffer {
+                stream,
+                part,
+                sequence: n,
+                received: i64::from(us) * 1_000,
+                damaged: n % 11 == 7,
+                bytes,
+            };
+            if (n, stream) != (9, Stream::Color) && (n, stream) != (23, Stream::Depth) {
+                acts.push(act(Part::Picture, frame_bytes(stream, n)));
+            }
+            if n % 8 != 5 {
+                acts.push(act(Part::Metadata, metadata_bytes(stream, n, us)));
+            }
+        }
+    }
+    acts.push(Act::Unplug);
+    acts
+}
+
+#[test]
+fn a_streaming_camera_allocates_nothing() {
+    let simulated = Camera::new(acts());
+    let log = simulated.log();
+    let plugged = Plugged::once(simulated);
+    let mut camera = RealSense::new(plugged, RealSenseConfig::default());
+    let (mut depth, mut color) = (vec![0; PIXELS], vec![0; 3 * PIXELS]);
+    let mut aligned = vec![0; PIXELS];
+    let (mut before, mut after) = (0, 0);
+    let mut frames = 0;
+    loop {
+        let images = RgbdImages {
+            depth: &mut depth,
+            color: &mut color,
+        };
+        match camera.read_frame(images, Stamp::from_nanos(i64::MAX)) {
+            Ok(header) => assert!(header.is_some()),
+            // Pulled out: that is the end, and an error may allocate.
+            Err(_) => break,
+        }
+        let geometry = *camera.geometry().unwrap();
+        depth_to_color(&geometry, &depth, &mut aligned).unwrap();
+        frames += 1;
+        after = ALLOCATIONS.load(Ordering::Relaxed);
+        if frames == 1 {
+            before = after;
+        }
+    }
+    assert_eq!(after - before, 0);
+    assert!(frames > 25, "{frames}");
+    assert_eq!(log.borrow().last().map(String::as_str), Some("start"));
+}

@@ -1,0 +1,250 @@
+//! Folders of images, one frame at a time.
+//!
+//! In: a folder of JPEG and PNG files, or a MOTChallenge sequence with them in `img1`. Out: frames
+//! in the order of the numbers in their names, and their pixels. What a file is, its first bytes
+//! say, whatever its name.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use hachi_inference::{ImageError, ImageView};
+use zune_core::bytestream::ZCursor;
+use zune_core::colorspace::ColorSpace;
+use zune_core::options::DecoderOptions;
+use zune_jpeg::JpegDecoder;
+
+use crate::exit::Failure;
+
+/// Longer sides are refused: 16k video has them.
+const MAX_SIDE: usize = 16_384;
+/// Larger images are refused: they would take 300 MB.
+const MAX_PIXELS: usize = 100_000_000;
+/// Larger files are refused.
+const MAX_FILE_BYTES: u64 = 256 << 20;
+
+/// RGB pixels, 8 bits each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rgb {
+    /// Pixels.
+    pub width: usize,
+    /// Pixels.
+    pub height: usize,
+    /// Row by row.
+    pub pixels: Vec<u8>,
+}
+
+impl Rgb {
+    /// The image as networks take it.
+    ///
+    /// # Errors
+    /// It has no pixel.
+    pub fn view(&self) -> Result<ImageView<'_>, ImageError> {
+        ImageView::new(self.width, self.height, &self.pixels)
+    }
+}
+
+/// One image of a folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// The number in its name; its place from 1, if not all names are numbers.
+    pub number: u64,
+    /// The file.
+    pub path: PathBuf,
+}
+
+/// The images in a folder.
+///
+/// # Errors
+/// The folder can't be read or holds none.
+pub fn frames(folder: &Path) -> Result<Vec<Frame>, Failure> {
+    let nested = folder.join("img1");
+    let folder = if nested.is_dir() {
+        nested.as_path()
+    } else {
+        folder
+    };
+    let unread = |error: std::io::Error| {
+        Failure::new(
+            format_args!("{} can't be read: {error}", folder.display()),
+            "give a folder of JPEG or PNG frames",
+        )
+    };
+    let mut paths = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unread)? {
+        let path = entry.map_err(unread)?.path();
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .unwrap_or_default();
+        if ["jpg", "jpeg", "png"].contains(&extension.to_ascii_lowercase().as_str()) {
+            paths.push(path);
+        }
+    }
+    if paths.is_empty() {
+        return Err(Failure::new(
+            format_args!("{} holds no .jpg or .png file", folder.display()),
+            "give a folder of JPEG or PNG frames",
+        ));
+    }
+    let number = |path: &PathBuf| path.file_stem()?.to_str()?.parse::<u64>().ok();
+    let largest = hachi_people::mot::MAX_FRAME;
+    let numbers: Vec<_> = paths.iter().map(number).collect();
+    let mut sorted = numbers.clone();
+    sorted.sort_unstable();
+    sorted.dedup();
+    let numbered =
+        sorted.len() == paths.len() && sorted.iter().all(|n| n.is_some_and(|n| n <= largest));
+    if numbered {
+        let mut frames: Vec<_> = numbers
+            .into_iter()
+            .zip(paths)
+            .filter_map(|(number, path)| number.map(|number| Frame { number, path }))
+            .collect();
+        frames.sort_by_key(|frame| frame.number);
+        return Ok(frames);
+    }
+    paths.sort();
+    let place = |(index, path)| Frame {
+        number: index as u64 + 1,
+        path,
+    };
+    Ok(paths.into_iter().enumerate().map(place).collect())
+}
+
+/// Reads an image.
+///
+/// # Errors
+/// Why it can't be read or decoded, in a few words.
+pub fn read(path: &Path) -> Result<Rgb, String> {
+    let length = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
+    if length > MAX_FILE_BYTES {
+        return Err(format!("{length} bytes are more than {MAX_FILE_BYTES}"));
+    }
+    decode(&std::fs::read(path).map_err(|e| e.to_string())?)
+}
+
+/// Decodes a JPEG or PNG file.
+///
+/// # Errors
+/// What is wrong with it, in a few words.
+pub fn decode(bytes: &[u8]) -> Result<Rgb, String> {
+    match bytes {
+        [0xFF, 0xD8, ..] => jpeg(bytes),
+        [0x89, b'P', b'N', b'G', ..] => png(bytes),
+        [] => Err("the file is empty".to_owned()),
+        _ => Err("neither a JPEG nor a PNG file".to_owned()),
+    }
+}
+
+fn within_limits(width: usize, height: usize) -> Result<usize, String> {
+    match width.checked_mul(height) {
+        Some(pixels) if (1..=MAX_PIXELS).contains(&pixels) => Ok(pixels),
+        _ => Err(format!("{width}x{height} pixels are no size for an image")),
+    }
+}
+
+fn jpeg(bytes: &[u8]) -> Result<Rgb, String> {
+    let options = DecoderOptions::default()
+        .set_max_width(MAX_SIDE)
+        .set_max_height(MAX_SIDE)
+        .jpeg_set_out_colorspace(ColorSpace::RGB);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    decoder.decode_headers().map_err(|e| e.to_string())?;
+    let info = decoder.info().ok_or("it has no size")?;
+    let (width, height) = (usize::from(info.width), usize::from(info.height));
+    let places = within_limits(width, height)?;
+    let pixels = decoder.decode().map_err(|e| e.to_string())?;
+    match pixels.len() == 3 * places {
+        true => Ok(Rgb {
+            width,
+            height,
+            pixels,
+        }),
+        false => Err("its colours are not understood".to_owned()),
+    }
+}
+
+fn png(bytes: &[u8]) -> Result<Rgb, String> {
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    decoder.set_transformations(png::Transformations::normalize_to_color8());
+    let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
+    let (width, height) = (reader.info().width as usize, reader.info().height as usize);
+    let places = within_limits(width, height)?;
+    let size = reader.output_buffer_size().ok_or("too large")?;
+    let mut raw = vec![0; size];
+    let info = reader.next_frame(&mut raw).map_err(|e| e.to_string())?;
+    let raw = &raw[..info.buffer_size()];
+    let mut pixels = Vec::with_capacity(3 * places);
+    match info.color_type {
+        png::ColorType::Rgb => pixels.extend_from_slice(raw),
+        png::ColorType::Rgba => raw
+            .chunks_exact(4)
+            .for_each(|p| pixels.extend_from_slice(&p[..3])),
+        png::ColorType::Grayscale => raw.iter().for_each(|p| pixels.extend([*p; 3])),
+        png::ColorType::GrayscaleAlpha => {
+            raw.chunks_exact(2).for_each(|p| pixels.extend([p[0]; 3]));
+        }
+        png::ColorType::Indexed => return Err("its palette is not understood".to_owned()),
+    }
+    match pixels.len() == 3 * places {
+        true => Ok(Rgb {
+            width,
+            height,
+            pixels,
+        }),
+        false => Err("it is cut short".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(colour: png::ColorType, data: &[u8]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
+        encoder.set_color(colour);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(data).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    #[test]
+    fn colours_and_greys_become_rgb() {
+        let rgba = written(png::ColorType::Rgba, &[1, 2, 3, 255, 4, 5, 6, 0]);
+        assert_eq!(decode(&rgba).unwrap().pixels, [1, 2, 3, 4, 5, 6]);
+        let grey = written(png::ColorType::Grayscale, &[9, 8]);
+        assert_eq!(decode(&grey).unwrap().pixels, [9, 9, 9, 8, 8, 8]);
+    }
+
+    #[test]
+    fn what_is_no_image_is_refused() {
+        let whole = written(png::ColorType::Rgb, &[1, 2, 3, 4, 5, 6]);
+        for bytes in [&b""[..], b"BM", b"\xFF\xD8\xFF", &whole[..40], &whole[..8]] {
+            assert!(decode(bytes).is_err(), "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn frames_come_in_the_order_of_their_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["10.jpg", "9.jpg", "notes.txt", "100.png"] {
+            std::fs::write(folder.path().join(name), b"x").unwrap();
+        }
+        let numbers: Vec<_> = frames(folder.path())
+            .unwrap()
+            .iter()
+            .map(|f| f.number)
+            .collect();
+        assert_eq!(numbers, [9, 10, 100]);
+        std::fs::write(folder.path().join("last.jpg"), b"x").unwrap();
+        let numbers: Vec<_> = frames(folder.path())
+            .unwrap()
+            .iter()
+            .map(|f| f.number)
+            .collect();
+        assert_eq!(numbers, [1, 2, 3, 4]);
+    }
+}
