@@ -43,6 +43,8 @@ pub struct Seen {
 
 pub struct Simulated {
     orders: Sender<Order>,
+    /// Told of each late answer once it is on the line.
+    late: Receiver<()>,
     thread: JoinHandle<Seen>,
 }
 
@@ -52,8 +54,14 @@ impl Simulated {
         let (mut far, near) = TTYPort::pair().unwrap();
         far.set_timeout(Duration::from_millis(5)).unwrap();
         let (orders, received) = channel();
-        let thread = thread::spawn(move || run(far, &received, behaviours.into()));
-        (Self { orders, thread }, near)
+        let (told, late) = channel();
+        let thread = thread::spawn(move || run(far, &received, &told, behaviours.into()));
+        let gripper = Self {
+            orders,
+            late,
+            thread,
+        };
+        (gripper, near)
     }
 
     /// Puts something between the fingers that stops them at a count, or takes it away.
@@ -67,6 +75,11 @@ impl Simulated {
 
     pub fn behave(&self, behaviours: Vec<Behaviour>) {
         self.orders.send(Order::Behave(behaviours)).unwrap();
+    }
+
+    /// Waits until a late answer is on the line.
+    pub fn wait_for_late_answer(&self) {
+        self.late.recv().unwrap();
     }
 
     /// Closes its end of the line.
@@ -146,7 +159,12 @@ impl Fingers {
     }
 }
 
-fn run(mut line: TTYPort, orders: &Receiver<Order>, mut next: VecDeque<Behaviour>) -> Seen {
+fn run(
+    mut line: TTYPort,
+    orders: &Receiver<Order>,
+    late: &Sender<()>,
+    mut next: VecDeque<Behaviour>,
+) -> Seen {
     let mut fingers = Fingers {
         command: Command::default(),
         state: State::default(),
@@ -236,6 +254,10 @@ fn run(mut line: TTYPort, orders: &Receiver<Order>, mut next: VecDeque<Behaviour
             }
         }
         line.write_all(&said).unwrap();
+        if matches!(behaviour, Behaviour::Late(_)) {
+            // Nobody needs to listen.
+            let _ = late.send(());
+        }
         last = Some(Instant::now());
     }
 }
