@@ -1,6 +1,7 @@
 //! An image, or a part of it, at another size.
 //!
-//! In: RGB pixels and a region. Out: single-precision RGB, not rounded. Each output pixel is a sum
+//! In: RGB pixels and a region. Out: RGB in whole numbers, as networks saw them when they were
+//! trained: OpenCV and Pillow round to 8 bits, Pillow after either sum. Each output pixel is a sum
 //! of the pixels around it, weighted by a triangle: one pixel wide on either side as in OpenCV's
 //! `INTER_LINEAR`, or, for images that shrink, as wide as a pixel of the output, as in Pillow's
 //! `BILINEAR`. Columns and rows are summed one after the other.
@@ -91,6 +92,7 @@ impl Resampler {
                         *sum += weight * f32::from(*value);
                     }
                 }
+                target.iter_mut().for_each(round);
             }
         }
         self.pixels.clear();
@@ -103,7 +105,12 @@ impl Resampler {
                     *sum += weight * value;
                 }
             }
+            target.iter_mut().for_each(round);
         }
         &self.pixels
     }
+}
+
+fn round(value: &mut f32) {
+    *value = (*value + 0.5).floor();
 }

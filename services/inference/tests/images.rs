@@ -108,8 +108,8 @@ fn a_picture_that_shrinks_is_averaged_if_it_is_to_be_smooth() {
     // A triangle of reach 4 around 1.5, cut at the edge: weights 5/8 at 0, 7/8, 7/8, 5/8, 3/8, 1/8:
     // (7 + 5 + 1) / 28 of 200 in odd pixels, and the same mirrored on the other side.
     let (low, high) = (slots[1][0], slots[1][11]);
-    assert!((low - 200.0 * 13.0 / 28.0).abs() < 1e-3, "{low}");
-    assert!((high - 200.0 * 15.0 / 28.0).abs() < 1e-3, "{high}");
+    assert_eq!(low, (200.0_f32 * 13.0 / 28.0).round());
+    assert_eq!(high, (200.0_f32 * 15.0 / 28.0).round());
 }
 
 #[test]

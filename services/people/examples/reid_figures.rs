@@ -4,8 +4,9 @@
 //! a folder of folders, one for each person, with pictures `CAMERA_NUMBER.*`.
 //!
 //! Ranking: every fourth picture of the first camera is searched for in all of the second. Target
-//! against distractors: twelve of a person's pictures, from both cameras in turns, calibrate; the
-//! rest, and as many of others, are told apart by the threshold. Dealt ten times anew.
+//! against distractors: twelve of a person's pictures, from both cameras in turns, calibrate
+//! FollowMe, and are shown to CARPE-ID three hundred times in any order; the rest, and as many of
+//! others, are told apart by the threshold. Dealt ten times anew.
 #![allow(clippy::print_stdout, reason = "an example prints its result")]
 
 use std::collections::BTreeMap;
@@ -147,7 +148,7 @@ fn told_apart(people: &[Pictures], adapts: bool) -> [usize; 4] {
                 }
             }
             let (seen, held_back) = dealt.split_at(CALIBRATE.min(dealt.len()));
-            let Some(model) = learnt(seen, adapts) else {
+            let Some(model) = learnt(seen, adapts, &mut random) else {
                 continue;
             };
             let near = |feature: &[f32]| model.distance(feature) <= model.threshold();
@@ -163,15 +164,21 @@ fn told_apart(people: &[Pictures], adapts: bool) -> [usize; 4] {
     counts
 }
 
-/// FollowMe's model of these pictures, or CARPE-ID's after it has followed them one by one.
-fn learnt(seen: &[&Vec<f32>], adapts: bool) -> Option<AppearanceModel> {
+/// FollowMe's model of these pictures, or CARPE-ID's after it has followed them for a while.
+fn learnt(
+    seen: &[&Vec<f32>],
+    adapts: bool,
+    random: &mut impl FnMut(usize) -> usize,
+) -> Option<AppearanceModel> {
+    const FRAMES: usize = 300;
     if !adapts {
         let mut calibration = Calibration::new(seen.len());
         seen.iter().for_each(|feature| calibration.push(feature));
         return calibration.finish().ok();
     }
     let mut model = AppearanceModel::first(seen.first()?)?;
-    for feature in &seen[1..] {
+    for _ in 0..FRAMES {
+        let feature = seen[random(seen.len())];
         let distance = model.distance(feature);
         model.learn(feature, distance);
     }

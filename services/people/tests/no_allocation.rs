@@ -1,4 +1,5 @@
-//! Once warm, following twenty people allocates nothing, and takes little time.
+//! Once warm, following twenty people and knowing three of them allocates nothing, and takes
+//! little time.
 #![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
 #![allow(
     clippy::print_stdout,
@@ -10,6 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use hachi_people::BoundingBox;
+use hachi_people::identify::{AppearanceModel, Condition, Identifier, IdentifierConfig};
 use hachi_people::track::{Detection, Features, Frame, Tracker, TrackerConfig};
 
 struct Counting;
@@ -67,23 +69,34 @@ fn people_at(frame: usize, detections: &mut Vec<Detection>, features: &mut Vec<f
 #[test]
 fn twenty_people_cost_no_memory_once_warm() {
     let mut tracker = Tracker::new(TrackerConfig::default());
+    let mut identifier = Identifier::new(IdentifierConfig::default());
     let (mut detections, mut features) = (Vec::new(), Vec::new());
     let mut allocations = 0;
     let mut times_ms = Vec::with_capacity(CYCLES);
     for frame in 0..2 * CYCLES {
         people_at(frame, &mut detections, &mut features);
+        let features = Features {
+            dimension: DIMENSION,
+            values: &features,
+            same_person_distance: 0.5,
+        };
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         let begun = Instant::now();
         tracker.step(&Frame {
             dt_s: 1.0 / 30.0,
             detections: &detections,
-            features: Some(Features {
-                dimension: DIMENSION,
-                values: &features,
-                same_person_distance: 0.5,
-            }),
+            features: Some(features),
             image_motion: None,
         });
+        if frame == 100 {
+            let seen = tracker.tracks().iter().filter(|track| track.is_seen());
+            for track in seen.take(3) {
+                let feature = features.get(track.detection.unwrap()).unwrap();
+                let model = AppearanceModel::first(feature).unwrap();
+                identifier.enrol(model, Some(track.id));
+            }
+        }
+        identifier.step(tracker.tracks(), Some(features), 1.0 / 30.0);
         if frame >= CYCLES {
             allocations += ALLOCATIONS.load(Ordering::Relaxed) - before;
             times_ms.push(begun.elapsed().as_secs_f64() * 1e3);
@@ -92,6 +105,10 @@ fn twenty_people_cost_no_memory_once_warm() {
     times_ms.sort_by(f64::total_cmp);
     println!("median step: {:.3} ms", times_ms[times_ms.len() / 2]);
     assert_eq!(allocations, 0, "allocations");
+    let known = identifier
+        .statuses()
+        .filter(|s| s.condition != Condition::Searching);
+    assert_eq!(known.count(), 3);
     let believed = tracker.tracks().iter().filter(|t| t.is_confirmed());
     assert_eq!(believed.count(), PEOPLE);
 }

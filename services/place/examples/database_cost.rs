@@ -3,7 +3,8 @@
 //! A robot drives up and down through a city made of blocks, one place every 2 m. For each size of
 //! the database: the search for known places seen again from half a metre aside and turned, with
 //! the outdoor profile's three views; the mean and the worst insertion since the row before; memory
-//! by place. Describing is timed on a cloud of 30,000 points.
+//! by place. Half of the searches take no longer than the first figure: on a busy machine it says
+//! more than the mean. Describing is timed on a cloud of 30,000 points.
 //!
 //! `cargo run --release -p hachi-place --example database_cost`
 
@@ -32,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut views = Vec::new();
     let mut one = Descriptor::default();
     let mut matches = Vec::new();
-    println!("\nplaces   search ms: mean  p99   found   insert ms: mean  worst   file kB/place");
+    println!("\nplaces   search ms: half  p99   found   insert ms: mean  worst   file kB/place");
     let mut inserted = Vec::new();
     for place in 0..=SIZES[SIZES.len() - 1] {
         if SIZES.contains(&place) {
@@ -51,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
             println!(
                 "{place:>6}            {:>6.3} {:>5.3}   {:>3} %              {:>6.4} {:>6.2}   {:>13.2}",
-                ms(mean(&searched)),
+                ms(quantile(&mut searched, 0.5)),
                 ms(quantile(&mut searched, 0.99)),
                 found * 100 / SEARCHES,
                 ms(mean(&inserted)),

@@ -159,7 +159,7 @@ pub(crate) struct BodyHit {
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     id: u32,
-    parts: [Capsule; 14],
+    parts: [Capsule; 15],
     /// A ball around all of it.
     centre: Vector,
     reach: f32,
@@ -225,6 +225,7 @@ impl Body {
             j,
             rod([0.0, 0.09, 0.98], [0.0, 0.11, 1.37], 0.12, top),
             rod([0.0, -0.09, 0.98], [0.0, -0.11, 1.37], 0.12, top),
+            rod([0.0, 0.0, 1.42], [0.01, 0.0, 1.56], 0.055, person.skin),
             ball([0.02, 0.0, 1.62], 0.11, person.skin),
             ball([-0.01, 0.0, 1.645], 0.105, person.hair),
         ];

@@ -40,7 +40,7 @@ pub fn decode(
         let middle = [(dx + x as f64) * stride, (dy + y as f64) * stride];
         candidates.push(Candidate {
             bounding_box: BoundingBox::around(middle, w.exp() * stride, h.exp() * stride),
-            score,
+            score: score.min(1.0),
             class,
             place,
         });

@@ -26,8 +26,9 @@ const SAME_M: f32 = 0.02;
 const SAME_SHARE: f32 = 0.01;
 /// Disparities are found in these steps, pixels.
 const DISPARITY_STEP_PX: f64 = 1.0 / 32.0;
-/// Light from above, and from everywhere.
-const AMBIENT: f32 = 0.45;
+/// Share of the light that comes from everywhere; the rest comes from above.
+const AMBIENT: f32 = 0.6;
+/// What is seen where there is nothing.
 const SKY: Rgb = [205, 220, 235];
 
 /// Where pixels look: unit vectors in the camera's frame, row by row.
