@@ -294,6 +294,7 @@ impl MappingConfig {
                 f64::from(odometry.cell_m.unwrap_or(f32::MIN_POSITIVE)),
             ),
             ("odometry.map_range_m", f64::from(odometry.map_range_m)),
+            ("odometry.map_memory_m", odometry.map_memory_m),
             ("odometry.knot_interval_s", odometry.knot_interval_s),
             (
                 "odometry.agility.acceleration",

@@ -16,6 +16,9 @@ pub struct OdometryConfig {
     pub cell_m: Option<f32>,
     /// Surfaces farther from the robot than this are dropped from the map.
     pub map_range_m: f32,
+    /// Surfaces not seen for so much of the way are dropped too: odometry drifts, and a place come
+    /// back to would contradict itself. Loops are SLAM's to close.
+    pub map_memory_m: f64,
     /// Time between two poses within a scan: short against the gait, long enough for the points
     /// in it to fix a pose.
     pub knot_interval_s: f64,
@@ -45,6 +48,7 @@ impl Default for OdometryConfig {
             target_points: 3_000,
             cell_m: None,
             map_range_m: 100.0,
+            map_memory_m: 100.0,
             knot_interval_s: 0.025,
             agility: Agility::default(),
             degeneracy_threshold: 0.003,

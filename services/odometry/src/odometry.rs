@@ -500,7 +500,9 @@ impl Odometry {
         if (here - self.tidied_at).norm() < TIDY_EVERY_M {
             return;
         }
-        self.map.keep_around(here.cast::<f32>().into());
+        let stretches = (self.config.map_memory_m / TIDY_EVERY_M).ceil();
+        self.map
+            .keep_around(here.cast::<f32>().into(), stretches as u32);
         self.tidied_at = here;
         let wanted = self.cell_for_scale();
         let change = wanted / self.map.cell_m();

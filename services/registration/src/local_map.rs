@@ -42,6 +42,8 @@ struct Cell {
     scatter: [f32; 6],
     normal: [f32; 3],
     touched: bool,
+    /// In which stretch of the way a point last fell into it.
+    seen: u32,
 }
 
 /// The map.
@@ -51,6 +53,8 @@ pub struct LocalMap {
     cells: Vec<Cell>,
     slots: Vec<u32>,
     touched: Vec<u32>,
+    /// Stretches of the way so far, as [`LocalMap::keep_around`] counts them.
+    stretch: u32,
 }
 
 impl LocalMap {
@@ -61,6 +65,7 @@ impl LocalMap {
             cells: Vec::with_capacity(CELLS),
             slots: vec![FREE; 2 * CELLS],
             touched: Vec::with_capacity(CELLS / 4),
+            stretch: 0,
         }
     }
 
@@ -104,6 +109,7 @@ impl LocalMap {
             let cell = &mut self.cells[index];
             if !cell.touched {
                 cell.touched = true;
+                cell.seen = self.stretch;
                 self.touched.push(index as u32);
             }
             cell.add(p);
@@ -116,12 +122,17 @@ impl LocalMap {
         self.touched.clear();
     }
 
-    /// Drops every cell farther than the map's range from `centre`.
-    pub fn keep_around(&mut self, centre: [f32; 3]) {
+    /// Ends a stretch of the way at `centre`. Drops every cell farther than the map's range from there,
+    /// and every cell into which nothing fell during the last `stretches` of them: poses drift
+    /// meanwhile, and what was seen before the drift contradicts what is seen after it.
+    pub fn keep_around(&mut self, centre: [f32; 3], stretches: u32) {
+        self.stretch = self.stretch.wrapping_add(1);
+        let stretch = self.stretch;
         let range_sq = self.config.range_m * self.config.range_m;
         let near = |c: &Cell| -> bool {
             let d: [f32; 3] = std::array::from_fn(|a| c.mean[a] - centre[a]);
-            d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= range_sq
+            let is_recent = stretch.wrapping_sub(c.seen) <= stretches;
+            is_recent && d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= range_sq
         };
         self.cells.retain(near);
         self.rebuild_slots();
@@ -149,8 +160,15 @@ impl LocalMap {
             let Some(key) = key_of(cell.mean, 1.0 / cell_m) else {
                 continue;
             };
+            let known = self.cells.len();
             let index = self.find_or_add(key, cell.mean);
-            self.cells[index].merge(cell);
+            let into = &mut self.cells[index];
+            into.merge(cell);
+            into.seen = if index < known {
+                into.seen.max(cell.seen)
+            } else {
+                cell.seen
+            };
         }
         for index in 0..self.cells.len() {
             self.cells[index].normal = self.normal_of(index);
@@ -233,6 +251,7 @@ impl LocalMap {
                     scatter: [0.0; 6],
                     normal: [0.0; 3],
                     touched: false,
+                    seen: self.stretch,
                 });
                 return new;
             }
@@ -378,4 +397,29 @@ fn products(d: [f32; 3]) -> [f32; 6] {
         d[1] * d[2],
         d[2] * d[2],
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surfaces_leave_that_are_far_or_were_not_seen_for_long() {
+        let mut map = LocalMap::new(LocalMapConfig {
+            cell_m: 1.0,
+            range_m: 50.0,
+        });
+        let (seen_once, seen_again, far) = ([1.5, 0.5, 0.5], [5.5, 0.5, 0.5], [90.5, 0.5, 0.5]);
+        map.insert([seen_once, seen_again, far].into_iter());
+        let positions = |map: &LocalMap| map.surfaces().map(|s| s.position).collect::<Vec<_>>();
+        map.keep_around([0.0; 3], 2);
+        assert_eq!(positions(&map), [seen_once, seen_again]);
+        map.insert([seen_again].into_iter());
+        map.rescale(0.9);
+        map.keep_around([0.0; 3], 2);
+        assert_eq!(positions(&map).len(), 2);
+        map.keep_around([0.0; 3], 2);
+        assert_eq!(positions(&map), [seen_again]);
+        assert!(map.closest(seen_once, 0.1).is_none());
+    }
 }

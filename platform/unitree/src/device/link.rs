@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::vec::Vec;
 
 use hachi_datagram::{SystemClock, UdpConfig, UdpError, UdpSource};
 use hachi_hal::{Clock, PacketSource, Received, Stamp};
@@ -74,10 +73,23 @@ impl RobotLink for UdpLink {
 /// Frames that wait in a [`MemoryLink`]; more are lost, the oldest first, as in a socket's buffer.
 const MOST_WAITING: usize = 64;
 
-#[derive(Debug, Default)]
+/// A frame on its way.
+pub type WireFrame = heapless::Vec<u8, LONGEST_FRAME>;
+
+#[derive(Debug)]
 struct Wires {
-    to_robot: VecDeque<Vec<u8>>,
-    to_host: VecDeque<(Stamp, Vec<u8>)>,
+    to_robot: VecDeque<WireFrame>,
+    to_host: VecDeque<(Stamp, WireFrame)>,
+}
+
+impl Default for Wires {
+    /// With room for all that may wait.
+    fn default() -> Self {
+        Self {
+            to_robot: VecDeque::with_capacity(MOST_WAITING),
+            to_host: VecDeque::with_capacity(MOST_WAITING),
+        }
+    }
 }
 
 /// Host and robot in one program, on any clock: what one sends, the other has at once. Clones are
@@ -103,18 +115,21 @@ impl<C: Clock> MemoryLink<C> {
     }
 
     /// The robot's side: the oldest frame from the host.
-    pub fn heard(&self) -> Option<Vec<u8>> {
+    pub fn heard(&self) -> Option<WireFrame> {
         self.wires().to_robot.pop_front()
     }
 
-    /// The robot's side: a frame to the host.
+    /// The robot's side: a frame to the host. One that is longer than any frame is lost.
     pub fn answer(&self, payload: &[u8]) {
         let stamp = self.clock.now();
+        let Ok(frame) = WireFrame::from_slice(payload) else {
+            return;
+        };
         let queue = &mut self.wires().to_host;
         if queue.len() >= MOST_WAITING {
             queue.pop_front();
         }
-        queue.push_back((stamp, payload.to_vec()));
+        queue.push_back((stamp, frame));
     }
 }
 
@@ -147,12 +162,18 @@ impl<C: Clock> PacketSource for MemoryLink<C> {
 
 impl<C: Clock> RobotLink for MemoryLink<C> {
     fn send(&mut self, payload: &[u8]) -> Result<(), UdpError> {
-        debug_assert!(payload.len() <= LONGEST_FRAME);
+        let Ok(frame) = WireFrame::from_slice(payload) else {
+            return Err(UdpError::Oversize {
+                port: 0,
+                len: payload.len(),
+                capacity: LONGEST_FRAME,
+            });
+        };
         let queue = &mut self.wires().to_robot;
         if queue.len() >= MOST_WAITING {
             queue.pop_front();
         }
-        queue.push_back(payload.to_vec());
+        queue.push_back(frame);
         Ok(())
     }
 
