@@ -15,8 +15,17 @@ struct Walk {
 
 impl Walk {
     fn run(world: &SimulationConfig, config: OdometryConfig, with_legs: bool) -> Self {
+        Self::seen_through(FilterConfig::default(), world, config, with_legs)
+    }
+
+    fn seen_through(
+        filters: FilterConfig,
+        world: &SimulationConfig,
+        config: OdometryConfig,
+        with_legs: bool,
+    ) -> Self {
         let mut scans = SimulatedScans::new(world.clone());
-        let mut filters = Filters::new(FilterConfig::default()).unwrap();
+        let mut filters = Filters::new(filters).unwrap();
         let mut odometry = Odometry::new(config);
         let mut legs = world.odometry();
         let mut samples: Vec<OdometrySample> = Vec::new();
@@ -145,6 +154,23 @@ fn a_long_corridor_is_held_along_its_axis_with_legs_and_without() {
         let walk = Walk::run(&world, config, with_legs);
         assert!(walk.last_m() < 0.3, "legs {with_legs}: {}", walk.last_m());
     }
+}
+
+/// Nothing within sight fixes the way along the corridor, for hundreds of scans on end: there the
+/// legs have to carry the pose, and nothing may take back what they carried.
+#[test]
+fn a_corridor_whose_end_is_out_of_sight_is_held_by_the_legs() {
+    let world = SimulationConfig::preset(Preset::Corridor, 3, 60.0);
+    let near = FilterConfig {
+        far_m: 12.0,
+        ..FilterConfig::default()
+    };
+    let config = OdometryConfig {
+        base_from_lidar: world.base_from_lidar,
+        ..OdometryConfig::default()
+    };
+    let walk = Walk::seen_through(near, &world, config, true);
+    assert!(walk.worst_m() < 0.3, "{}", walk.worst_m());
 }
 
 #[test]

@@ -6,11 +6,17 @@
 use hachi_hal::{Pose, Rotation, Vector3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector6};
 
+use crate::degeneracy::Degeneracy;
+
 /// Most intervals one scan is cut into.
 pub const MAX_INTERVALS: usize = 6;
 /// The intervals' ends, and the knot before.
 pub(crate) const KNOTS: usize = MAX_INTERVALS + 2;
 const SIZE: usize = 6 * KNOTS;
+
+/// How firmly the place along an open direction is held from scan to scan, 1/m²: a centimetre. Far
+/// more than rounding errors, far less than what a scan says of a direction that it sees.
+const PLACE_HELD: f64 = 1e4;
 
 type Information12 = SMatrix<f64, 12, 12>;
 
@@ -179,9 +185,14 @@ impl Chain {
 
     /// Keeps, as the prior of the next scan, what `system` says of the last two knots.
     ///
-    /// `trust` below 1 takes off for the errors of neighbouring scans not being independent.
-    pub(crate) fn keep_marginal(&mut self, system: &ChainSystem, trust: f64) {
+    /// `trust` below 1 takes off for the errors of neighbouring scans not being independent. Where
+    /// the scan left a direction `open` nothing renews what is taken off, and after some dozen scans
+    /// the place along it would be anybody's: there the last pose is held to what it was found to
+    /// be, so that it moves on by the motion from scan to scan alone.
+    pub(crate) fn keep_marginal(&mut self, system: &ChainSystem, trust: f64, open: &Degeneracy) {
         self.information = system.marginal_of_last_two(self.len) * trust;
+        let mut last = self.information.fixed_view_mut::<6, 6>(6, 6);
+        last += open.hold(PLACE_HELD);
     }
 }
 

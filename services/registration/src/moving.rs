@@ -154,7 +154,7 @@ impl MovingAligner {
                 break;
             }
         }
-        chain.keep_marginal(&self.system, TRUST);
+        chain.keep_marginal(&self.system, TRUST, &fit.degeneracy);
         fit
     }
 
