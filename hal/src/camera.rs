@@ -179,8 +179,8 @@ pub struct RgbdImages<'a> {
 /// - `geometry` is `Some` when a frame was delivered and belongs to that frame; it changes only
 ///   between frames, after an error;
 /// - on `Some`, the first `geometry.depth.pixels()` counts and three times
-///   `geometry.color.pixels()` bytes are the frame; images with less room are an error, never a
-///   cut frame;
+///   `geometry.color.pixels()` bytes are the frame; images with less room are an error
+///   ([`FaultKind::FixConfig`](crate::FaultKind::FixConfig)), never a cut frame;
 /// - stamps strictly increase and sequence numbers count up by one;
 /// - an error leaves the device usable: `read_frame` may be called again.
 pub trait RgbdCamera {

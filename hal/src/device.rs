@@ -4,6 +4,7 @@
 //! device, a recording and a mock all implement the same trait.
 
 use core::fmt;
+use core::time::Duration;
 
 use crate::{ImuSample, PointSink, ScanHeader, Stamp};
 
@@ -98,4 +99,67 @@ pub trait Imu {
 pub trait Clock {
     /// Now. Never goes backwards.
     fn now(&self) -> Stamp;
+
+    /// The moment that was `age_ns` ago on another clock of this computer, as a kernel tells of what
+    /// it took in. Nothing waits in a queue for longer than 10 s and nothing comes from the future:
+    /// such an age is that of a clock that was set in between, and now is all that is known.
+    fn ago(&self, age_ns: i64) -> Stamp {
+        let believed = (0..=MOST_AGE_NS).contains(&age_ns);
+        self.now() + if believed { -age_ns } else { 0 }
+    }
+
+    /// How long until `deadline`; zero if it has passed.
+    fn until(&self, deadline: Stamp) -> Duration {
+        let left_ns = deadline.nanos_since(self.now());
+        Duration::from_nanos(u64::try_from(left_ns).unwrap_or(0))
+    }
+}
+
+/// Most that a kernel's stamp may lie in the past and still be believed, ns.
+const MOST_AGE_NS: i64 = 10_000_000_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Stopped(i64);
+
+    impl Clock for Stopped {
+        fn now(&self) -> Stamp {
+            Stamp::from_nanos(self.0)
+        }
+    }
+
+    const S: i64 = 1_000_000_000;
+
+    #[test]
+    fn an_age_is_believed_while_it_can_be_one() {
+        let clock = Stopped(100 * S);
+        for (age_ns, stamp_ns) in [
+            (0, 100 * S),
+            (5_000_000, 100 * S - 5_000_000),
+            (10 * S, 90 * S),
+            (10 * S + 1, 100 * S),
+            (-1, 100 * S),
+            (i64::MIN, 100 * S),
+            (i64::MAX, 100 * S),
+        ] {
+            assert_eq!(clock.ago(age_ns).as_nanos(), stamp_ns, "{age_ns}");
+        }
+    }
+
+    #[test]
+    fn no_time_is_left_after_a_deadline() {
+        let clock = Stopped(100 * S);
+        for (deadline_ns, left) in [
+            (103 * S + 1, Duration::new(3, 1)),
+            (100 * S, Duration::ZERO),
+            (99 * S, Duration::ZERO),
+            (i64::MIN, Duration::ZERO),
+        ] {
+            assert_eq!(clock.until(Stamp::from_nanos(deadline_ns)), left);
+        }
+        let for_ever = Stopped(-S).until(Stamp::from_nanos(i64::MAX));
+        assert_eq!(for_ever, Duration::from_nanos(i64::MAX as u64));
+    }
 }

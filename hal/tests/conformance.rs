@@ -327,4 +327,18 @@ fn broken_promises_of_cameras_are_named() {
     large.depth.width = 3;
     let cut = check_camera(large, &[shot(0, 10)], [4, 6]);
     assert_eq!(cut, Err(Violation::CutFrame { room: [4, 6] }));
+    // One that delivers into images without room, whatever went wrong before.
+    let mut cut = shot(1, 20);
+    if let Step::Batch(shot) = &mut cut {
+        shot.depth = &[];
+    }
+    let fault = Step::Fault(FaultKind::Reopen);
+    for script in [
+        vec![shot(0, 10), cut],
+        vec![fault, shot(0, 10), cut],
+        vec![shot(0, 10), fault, cut],
+    ] {
+        let cut = check_camera(small_camera(), &script, [4, 6]);
+        assert_eq!(cut, Err(Violation::CutFrame { room: [0, 6] }));
+    }
 }

@@ -1,4 +1,7 @@
-//! What the end-to-end tests share: the simulated robot as scans, and errors against its truth.
+//! What the end-to-end tests share: the simulated robot as scans, errors against its truth, and a
+//! camera's firmware.
+
+pub mod firmware;
 
 use hachi_hal::{LidarScans, Point, Pose, ScanHeader, Stamp};
 use hachi_velodyne::{VelodyneConfig, VelodyneScans};

@@ -8,8 +8,9 @@ use hachi_realsense::device::{
     Buffer, CameraLink, CameraPort, CameraRequest, LinkError, Part, Stream, StreamFormat,
 };
 use hachi_realsense::frame::{CaptureTiming, DepthState, FrameMetadata, Layout};
-use hachi_realsense::monitor::{DeviceInfo, MONITOR_LEN, Opcode};
+use hachi_realsense::monitor::DeviceInfo;
 use hachi_realsense::{CameraError, Model, RealSense, RealSenseConfig, encode};
+use hachi_tests::firmware::Firmware;
 use hachi_world::{
     CameraConfig, CameraFrame, Outfit, Person, Preset, SimulatedCamera, SimulationConfig, Visit,
 };
@@ -24,6 +25,10 @@ const PIXELS: usize = (WIDTH * HEIGHT) as usize;
 const UNPLUGGED_AFTER: usize = 4;
 const FRAMES: usize = 8;
 const EXPOSURE_US: u32 = 8_000;
+const INFO: DeviceInfo = DeviceInfo {
+    firmware: [5, 16, 0, 1],
+    serial: [9; 6],
+};
 /// From the middle of an exposure to the kernel's stamp, ns.
 const WAY_NS: i64 = 6_000_000;
 
@@ -39,14 +44,10 @@ struct Simulated {
     frames_left: usize,
     waiting: VecDeque<(Stream, Part, Vec<u8>)>,
     received: Stamp,
-    asked: (u32, u32),
+    firmware: Firmware,
 }
 
 impl Simulated {
-    fn geometry(&self) -> RgbdGeometry {
-        self.camera.borrow().config().geometry
-    }
-
     /// Puts the next frame's four buffers in line.
     fn expose(&mut self) -> bool {
         let mut camera = self.camera.borrow_mut();
@@ -98,35 +99,11 @@ impl CameraLink for Simulated {
         true
     }
     fn set_unit(&mut self, selector: Selector, bytes: &[u8]) -> Result<(), LinkError> {
-        if selector == Selector::Monitor {
-            let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
-            self.asked = (number(4), number(8));
-        }
+        self.firmware.set(selector, bytes);
         Ok(())
     }
     fn get_unit(&mut self, _: Selector, query: Query, bytes: &mut [u8]) -> Result<(), LinkError> {
-        if bytes.len() < MONITOR_LEN {
-            bytes.fill(if query == Query::Maximum { 0xFF } else { 0 });
-            return Ok(());
-        }
-        let geometry = self.geometry();
-        let info = DeviceInfo {
-            firmware: [5, 16, 0, 1],
-            serial: [9; 6],
-        };
-        bytes.copy_from_slice(&match self.asked {
-            (0x10, _) => encode::answer(Opcode::DeviceInfo, &encode::device_info(&info)),
-            (0x15, 25) => {
-                let table = encode::depth_table(0.095, &[geometry.depth]);
-                encode::answer(Opcode::ReadCalibration, &table)
-            }
-            (0x15, _) => {
-                let depth_from_color = geometry.color_from_depth.inverse();
-                let table = encode::color_table(&geometry.color, &depth_from_color);
-                encode::answer(Opcode::ReadCalibration, &table)
-            }
-            _ => encode::answer(Opcode::ReadAdvanced, &1_000_u32.to_le_bytes()),
-        });
+        self.firmware.get(query, bytes);
         Ok(())
     }
     fn set_video(&mut self, _: Stream, _: u32, _: i32) -> Result<(), LinkError> {
@@ -179,7 +156,7 @@ impl CameraPort for Plugs {
             frames_left,
             waiting: VecDeque::new(),
             received: self.start,
-            asked: (0, 0),
+            firmware: Firmware::new(INFO, self.camera.borrow().config().geometry),
         }))
     }
 }

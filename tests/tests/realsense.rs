@@ -15,11 +15,16 @@ use hachi_realsense::device::{
     Buffer, CameraLink, CameraPort, CameraRequest, LinkError, Part, Stream, StreamFormat,
 };
 use hachi_realsense::frame::{CaptureTiming, DepthState, FrameMetadata, Layout};
-use hachi_realsense::monitor::{DeviceInfo, Opcode};
+use hachi_realsense::monitor::DeviceInfo;
 use hachi_realsense::{Model, RealSense, RealSenseConfig, encode};
+use hachi_tests::firmware::Firmware;
 use ros1::Message;
 
 const PIXELS: usize = 640 * 480;
+const INFO: DeviceInfo = DeviceInfo {
+    firmware: [5, 9, 14, 0],
+    serial: [0x72, 0x86, 0x12, 0x07, 0x02, 0x59],
+};
 
 /// The recording, or `None` with a word about it.
 fn recording() -> Option<Vec<Message>> {
@@ -256,8 +261,7 @@ fn real_depth_seen_from_the_colour_camera_is_where_librealsense_puts_it() {
 /// The recording as a camera.
 struct Recorded {
     buffers: std::vec::IntoIter<(Stream, Part, u32, i64, Vec<u8>)>,
-    geometry: RgbdGeometry,
-    asked: (u32, u32),
+    firmware: Firmware,
 }
 
 struct Once(Option<Recorded>);
@@ -280,35 +284,11 @@ impl CameraLink for Recorded {
         true
     }
     fn set_unit(&mut self, selector: Selector, bytes: &[u8]) -> Result<(), LinkError> {
-        if selector == Selector::Monitor {
-            let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
-            self.asked = (number(4), number(8));
-        }
+        self.firmware.set(selector, bytes);
         Ok(())
     }
     fn get_unit(&mut self, _: Selector, query: Query, bytes: &mut [u8]) -> Result<(), LinkError> {
-        if bytes.len() < 1_024 {
-            bytes.fill(if query == Query::Maximum { 0xFF } else { 0 });
-            return Ok(());
-        }
-        let depth_from_color = self.geometry.color_from_depth.inverse();
-        let info = DeviceInfo {
-            firmware: [5, 9, 14, 0],
-            serial: [0x72, 0x86, 0x12, 0x07, 0x02, 0x59],
-        };
-        let answer = match self.asked {
-            (0x10, _) => encode::answer(Opcode::DeviceInfo, &encode::device_info(&info)),
-            (0x15, 25) => {
-                let table = encode::depth_table(0.050_170, &[self.geometry.depth]);
-                encode::answer(Opcode::ReadCalibration, &table)
-            }
-            (0x15, 32) => {
-                let table = encode::color_table(&self.geometry.color, &depth_from_color);
-                encode::answer(Opcode::ReadCalibration, &table)
-            }
-            _ => encode::answer(Opcode::ReadAdvanced, &1_000_u32.to_le_bytes()),
-        };
-        bytes.copy_from_slice(&answer);
+        self.firmware.get(query, bytes);
         Ok(())
     }
     fn set_video(&mut self, _: Stream, _: u32, _: i32) -> Result<(), LinkError> {
@@ -362,8 +342,7 @@ fn real_frames_pair_by_the_cameras_own_clock() {
         }
         let recorded = Recorded {
             buffers: buffers.into_iter(),
-            geometry,
-            asked: (0, 0),
+            firmware: Firmware::new(INFO, geometry),
         };
         let config = RealSenseConfig {
             depth: StreamFormat::new(640, 480, 6),

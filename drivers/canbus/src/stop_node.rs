@@ -4,6 +4,11 @@
 //! In: frames. Out: pressed or not. What matters is the other direction: everything that is not a
 //! node in operation whose contacts say *closed* is *pressed*. A stop's contacts open when it is
 //! pressed, so that a broken wire stops the robot too.
+//!
+//! The inputs themselves have no age: the node sends them when they change, and with a living
+//! heartbeat the last ones stand for as long as that takes. A frame with them that is lost is lost
+//! until they change again, so that nothing may overflow on their way: have the kernel leave out all
+//! but [`StopNodeConfig::ids`].
 
 use hachi_hal::Stamp;
 
@@ -44,6 +49,13 @@ impl Default for StopNodeConfig {
             closed_inputs: 0b11,
             heartbeat_limit_ns: 250_000_000,
         }
+    }
+}
+
+impl StopNodeConfig {
+    /// The identifiers of the frames that say something of the stop: emergency, inputs, heartbeat.
+    pub fn ids(&self) -> [u16; 3] {
+        [EMERGENCY, INPUTS, HEARTBEAT].map(|function| function + u16::from(self.node))
     }
 }
 

@@ -198,6 +198,22 @@ fn frames_of_others_and_damaged_ones_are_no_sign_of_life() {
     assert_eq!(node.reason(at(251)), Some(StopReason::Silent));
 }
 
+/// CiA 301: emergency under 80h, the first inputs under 180h, the heartbeat under 700h, each with the
+/// node's number added.
+#[test]
+fn a_stop_listens_to_three_identifiers_and_no_other() {
+    let config = StopNodeConfig {
+        node: 5,
+        ..StopNodeConfig::default()
+    };
+    assert_eq!(config.ids(), [0x085, 0x185, 0x705]);
+    let mut node = StopNode::new(config).unwrap();
+    for id in 0..=0x7FF {
+        let taken = node.take(&frame(id, &[0; 8]), at(0));
+        assert_eq!(taken, Ok(config.ids().contains(&id)), "{id:#05x}");
+    }
+}
+
 #[test]
 fn settings_that_watch_nothing_are_refused() {
     let with = |node, closed_inputs, heartbeat_limit_ns| {

@@ -239,4 +239,23 @@ fn frames_go_over_the_kernels_virtual_bus() {
     assert_eq!(second.frame, request);
     assert!((0..5_000 * MS).contains(&second.age_ns));
     assert_eq!(there.receive(Duration::from_millis(5)).unwrap(), None);
+
+    // A socket for a stop's frames alone sees nothing else, however much there is.
+    let config = StopNodeConfig::default();
+    let mut of_stop = SocketCan::open_for("vcan0", &config.ids()).unwrap();
+    for id in [0x123, 0x182, 0x701, 0x7FF] {
+        here.send(&CanFrame::new(id, &[5]).unwrap()).unwrap();
+    }
+    let heard = of_stop.receive(limit).unwrap().unwrap().frame;
+    assert_eq!(heard.id(), 0x701);
+    assert_eq!(of_stop.receive(Duration::from_millis(5)).unwrap(), None);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interface_that_is_not_there_is_said_for_a_few_identifiers_too() {
+    use hachi_canbus::device::SocketCan;
+    let missing = SocketCan::open_for("nocan9", &[0x701]).unwrap_err();
+    assert_eq!(missing.kind(), FaultKind::FixConfig);
+    assert!(missing.to_string().contains("nocan9"), "{missing}");
 }

@@ -1,14 +1,8 @@
 //! The robot's clock on a computer with an operating system.
 
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use hachi_hal::{Clock, Stamp};
-
-/// Most that a kernel stamp may lie in the past and still be believed, ns.
-///
-/// A datagram that waited longer in the socket than this is older than any buffer can be; such an
-/// age comes from the computer's date having been set in between.
-const MAX_AGE_NS: i64 = 10_000_000_000;
 
 /// A clock that runs with the monotonic clock and was set to UNIX time once, when it was made.
 ///
@@ -30,21 +24,9 @@ impl SystemClock {
     }
 
     /// The stamp of a moment that the computer's date clock called `unix_ns`: as long ago on this
-    /// clock as it is on that one. A moment in the future is taken as now.
+    /// clock as it is on that one, if that can be ([`Clock::ago`]).
     pub fn stamp_of_unix(&self, unix_ns: i64) -> Stamp {
-        let age_ns = unix_now_ns().saturating_sub(unix_ns);
-        let believed_ns = if (0..=MAX_AGE_NS).contains(&age_ns) {
-            age_ns
-        } else {
-            0
-        };
-        self.now() + -believed_ns
-    }
-
-    /// How long until `deadline`; zero if it has passed.
-    pub fn until(&self, deadline: Stamp) -> Duration {
-        let left_ns = deadline.nanos_since(self.now());
-        Duration::from_nanos(u64::try_from(left_ns).unwrap_or(0))
+        self.ago(unix_now_ns().saturating_sub(unix_ns))
     }
 }
 

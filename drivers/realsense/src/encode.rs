@@ -1,8 +1,8 @@
 //! The other direction: what a camera says, as its own bytes.
 //!
 //! In: pictures, times, calibration. Out: buffers, tables and answers that the decoders read back,
-//! byte for byte what a camera would send. Simulators and tests share this, so that there is one
-//! place that knows the layouts in this direction.
+//! byte for byte what a camera would send. Tests and fuzz targets share this. A simulator that is to
+//! check the decoders writes its pictures itself.
 
 use hachi_hal::{Distortion, Intrinsics, Pose};
 

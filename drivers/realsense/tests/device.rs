@@ -319,6 +319,33 @@ fn a_camera_that_falls_silent_is_opened_anew() {
     assert_eq!(harness.dropped(), [("stalled", 1)]);
 }
 
+/// The colour camera goes on, the depth camera does not: nothing comes out, and that is a stall too.
+#[test]
+fn a_camera_whose_depth_dies_is_opened_anew() {
+    let mut acts = pairs(1, 1_000_000);
+    for i in 1..100 {
+        let us = 1_004_000 + u64::from(i) * 33_333;
+        acts.extend(shot(Stream::Color, i, us, OFFSET_NS));
+    }
+    let plugged = Plugged::script(vec![
+        Some(Camera::new(acts)),
+        Some(Camera::new(pairs(1, 9_000_000))),
+    ]);
+    let mut harness = Harness::new(plugged);
+    let at = |ms: i64| Stamp::from_nanos(OFFSET_NS + ms * MS);
+    assert!(harness.read_by(at(1_100)).unwrap().is_some());
+    for ms in [1_200, 1_700, 2_200, 2_700, 3_100] {
+        assert!(harness.read_by(at(ms)).unwrap().is_none(), "{ms}");
+    }
+    let stalled = harness.read_by(at(3_200)).unwrap_err();
+    assert_eq!(stalled.kind(), FaultKind::Reopen);
+    assert!(stalled.to_string().contains("both streams"), "{stalled}");
+    assert!(harness.read_by(at(9_100)).unwrap().is_some());
+    let counters = harness.camera.counters();
+    assert_eq!((counters.opened, counters.stalled), (2, 1));
+    assert!(counters.color.unpaired > 50, "{counters:?}");
+}
+
 #[test]
 fn settings_reach_the_camera_in_an_order_that_it_takes() {
     let config = RealSenseConfig {

@@ -12,6 +12,7 @@ use hachi_hal::{
 };
 use hachi_robotiq::device::{RobotiqConfig, SerialLine};
 use hachi_robotiq::{GripperError, Robotiq};
+use serialport::{SerialPort, TTYPort};
 use simulated::{Behaviour, Simulated};
 
 #[derive(Clone, Copy)]
@@ -186,6 +187,49 @@ fn a_fault_is_named_and_only_activation_ends_it() {
     assert!(fault.to_string().contains("too much current"), "{fault}");
     harness.gripper.activate().unwrap();
     harness.until(|sample| sample.grip == Grip::Free);
+}
+
+/// What the computer remembers is of no matter: a gripper that holds something must not let go because
+/// the program that drives it is another one now.
+#[test]
+fn a_stop_after_a_restart_of_the_program_keeps_the_gripper_active_and_holding() {
+    let (simulated, port) = Simulated::start(Vec::new());
+    let clock = Running(Instant::now());
+    let line = |port: &TTYPort| SerialLine::from_port(port.try_clone().unwrap());
+    let mut harness = Harness {
+        gripper: Robotiq::new(line(&port), clock, RobotiqConfig::default()),
+        clock,
+        simulated,
+    };
+    harness.activate();
+    harness.simulated.put_object(Some(0xBD));
+    harness.gripper.command(&to(0.0)).unwrap();
+    let held = harness.until(|sample| sample.grip != Grip::Moving);
+    assert_eq!(held.grip, Grip::Holding);
+
+    harness.gripper = Robotiq::new(line(&port), clock, RobotiqConfig::default());
+    harness.gripper.stop().unwrap();
+    let after = harness.read().unwrap().unwrap();
+    assert_ne!(after.grip, Grip::NotReady, "{after:?}");
+    assert_eq!(after.opening_m, held.opening_m);
+}
+
+#[test]
+fn a_stop_after_a_power_cut_moves_no_finger() {
+    let mut harness = Harness::new(Vec::new());
+    harness.activate();
+    harness.gripper.command(&to(0.04)).unwrap();
+    harness.until(|sample| sample.grip == Grip::Free);
+    harness.simulated.cut_power();
+    harness.gripper.stop().unwrap();
+    for _ in 0..10 {
+        let sample = harness.read().unwrap().unwrap();
+        assert_eq!(sample.grip, Grip::NotReady, "{sample:?}");
+        assert!(!harness.gripper.state().activate);
+    }
+    // Nor does a command, now that it is known.
+    let refused = harness.gripper.command(&to(0.0)).unwrap_err();
+    assert!(matches!(refused, GripperError::NotReady), "{refused}");
 }
 
 #[test]

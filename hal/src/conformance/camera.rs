@@ -1,7 +1,9 @@
 //! The promise of RGB-D cameras.
 
 use super::{Tally, Violation, timed};
-use crate::{Clock, RgbdCamera, RgbdGeometry, RgbdHeader, RgbdImages, Stamp};
+use crate::{
+    Clock, DeviceError as _, FaultKind, RgbdCamera, RgbdGeometry, RgbdHeader, RgbdImages, Stamp,
+};
 
 /// The promise of [`RgbdCamera`] about what is delivered, fed one frame at a time.
 #[derive(Debug, Clone, Default)]
@@ -48,7 +50,8 @@ impl FramePromise {
 }
 
 /// Reads `calls` times from a camera into `depth` and `color`, each with a deadline `wait_ns` from
-/// now on `clock`; after the first frame, once into images without room, which must be refused.
+/// now on `clock`; after the first frame, into images without room until it refused them, which it
+/// must.
 pub fn check_rgbd_camera<C: RgbdCamera>(
     camera: &mut C,
     clock: &dyn Clock,
@@ -57,8 +60,9 @@ pub fn check_rgbd_camera<C: RgbdCamera>(
     wait_ns: i64,
 ) -> Result<Tally, Violation> {
     let (mut tally, mut promise) = (Tally::default(), FramePromise::default());
+    let mut refused = false;
     for _ in 0..calls {
-        let cut = tally.items == 1 && tally.faults == 0;
+        let cut = tally.items > 0 && !refused;
         let images = RgbdImages {
             depth: if cut { &mut [] } else { &mut *depth },
             color: &mut *color,
@@ -73,7 +77,10 @@ pub fn check_rgbd_camera<C: RgbdCamera>(
                 tally.contents += (room[0] * 2 + room[1]) as u64;
             }
             Ok(None) => tally.nothing += 1,
-            Err(_) => tally.faults += 1,
+            Err(error) => {
+                tally.faults += 1;
+                refused |= cut && error.kind() == FaultKind::FixConfig;
+            }
         }
     }
     Ok(tally)

@@ -70,17 +70,6 @@ pub(super) fn receive(
     clock: &impl Clock,
     deadline: Stamp,
 ) -> Result<Option<(CanFrame, Stamp)>, BusError> {
-    /// A frame cannot have waited longer; an age beyond it comes from the date having been set.
-    const MOST_AGE_NS: i64 = 10_000_000_000;
-    let left_ns = deadline.nanos_since(clock.now());
-    let limit = Duration::from_nanos(u64::try_from(left_ns).unwrap_or(0));
-    let received = bus.receive(limit)?;
-    Ok(received.map(|Received { frame, age_ns }| {
-        let believed_ns = if (0..=MOST_AGE_NS).contains(&age_ns) {
-            age_ns
-        } else {
-            0
-        };
-        (frame, clock.now() + -believed_ns)
-    }))
+    let received = bus.receive(clock.until(deadline))?;
+    Ok(received.map(|Received { frame, age_ns }| (frame, clock.ago(age_ns))))
 }

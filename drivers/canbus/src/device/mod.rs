@@ -32,7 +32,8 @@ pub struct CanStop<B, C> {
 }
 
 impl<B: CanBus, C: Clock> CanStop<B, C> {
-    /// A stop behind a node on `bus`; `None` if the settings watch no contact of any node.
+    /// A stop behind a node on `bus`, which on a real robot is opened by
+    /// `SocketCan::open_for(interface, &config.ids())`; `None` if the settings watch no contact of any node.
     pub fn new(bus: B, clock: C, config: StopNodeConfig) -> Option<Self> {
         Some(Self {
             bus,

@@ -2,6 +2,7 @@
 
 use std::io::{Error, ErrorKind};
 use std::time::{Duration, Instant, SystemTime};
+use std::vec::Vec;
 
 use embedded_can::{Frame as _, Id, StandardId};
 use socketcan::{CanFrame as SocketFrame, CanSocket, Socket as _, SocketOptions as _};
@@ -13,6 +14,9 @@ use crate::frame::CanFrame;
 const SEND_LIMIT: Duration = Duration::from_millis(20);
 /// Shortest time that a socket can be told to wait: zero would be for ever.
 const SHORTEST: Duration = Duration::from_millis(1);
+
+/// What has to agree with a filter: the eleven bits of the identifier, and that it has no more.
+const SAME_ID: u32 = 0x8000_07FF;
 
 /// A CAN interface: `can0`, `vcan0`.
 #[derive(Debug)]
@@ -35,6 +39,23 @@ impl SocketCan {
         socket.set_recv_timestamp(true).map_err(failed)?;
         socket.set_write_timeout(SEND_LIMIT).map_err(failed)?;
         Ok(Self { socket, foreign: 0 })
+    }
+
+    /// Opens an interface for frames under these identifiers alone: the kernel leaves out the others,
+    /// so that what they say to each other can't fill the queue while its reader is busy.
+    ///
+    /// # Errors
+    /// As [`SocketCan::open`].
+    pub fn open_for(interface: &str, ids: &[u16]) -> Result<Self, BusError> {
+        let opened = Self::open(interface)?;
+        let filters = ids.iter().map(|&id| (u32::from(id), SAME_ID));
+        let filters: Vec<(u32, u32)> = filters.collect();
+        let failed = |source| BusError::Open {
+            interface: interface.into(),
+            source,
+        };
+        opened.socket.set_filters(&filters).map_err(failed)?;
+        Ok(opened)
     }
 
     /// Frames left out because they have identifiers of 29 bits or report errors.

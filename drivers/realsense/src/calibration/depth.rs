@@ -2,7 +2,7 @@
 
 use hachi_hal::{Distortion, Intrinsics};
 
-use super::{CalibrationError, TABLE_HEAD, contents};
+use super::{CalibrationError, TABLE_HEAD, believed, contents};
 use crate::bytes::{f32_at, f32s_at};
 
 /// Picture sizes in the order of the table's entries; 0 is an entry that is not used.
@@ -87,24 +87,14 @@ impl DepthCalibration {
     /// The entry's numbers are no camera's.
     pub fn intrinsics(&self, width: u32, height: u32) -> Result<Intrinsics, CalibrationError> {
         let [fx, fy, cx, cy] = self.pin_hole(width, height);
-        let intrinsics = Intrinsics {
+        let picture = Intrinsics {
             width,
             height,
             focal: [fx, fy],
             centre: [cx, cy],
             distortion: Distortion::None,
         };
-        let inside = |v: f64, size: u32| (0.0..f64::from(size)).contains(&v);
-        if intrinsics.is_sound() && inside(cx, width) && inside(cy, height) {
-            Ok(intrinsics)
-        } else {
-            Err(CalibrationError::Impossible {
-                table: Self::TABLE,
-                what: "intrinsics",
-                width,
-                height,
-            })
-        }
+        believed(picture, Self::TABLE)
     }
 
     fn pin_hole(&self, width: u32, height: u32) -> PinHole {

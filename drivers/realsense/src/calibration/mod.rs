@@ -8,6 +8,7 @@ pub(crate) mod color;
 pub(crate) mod depth;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
+use hachi_hal::Intrinsics;
 
 use crate::bytes::u32_at;
 
@@ -64,6 +65,22 @@ pub enum CalibrationError {
         /// Rows.
         height: u32,
     },
+}
+
+/// A table's numbers for a picture, if they are a camera's: it looks out of its own picture.
+fn believed(intrinsics: Intrinsics, table: u16) -> Result<Intrinsics, CalibrationError> {
+    let Intrinsics { width, height, .. } = intrinsics;
+    let mut centre = intrinsics.centre.into_iter().zip([width, height]);
+    if intrinsics.is_sound() && centre.all(|(c, size)| (0.0..f64::from(size)).contains(&c)) {
+        Ok(intrinsics)
+    } else {
+        Err(CalibrationError::Impossible {
+            table,
+            what: "intrinsics",
+            width,
+            height,
+        })
+    }
 }
 
 /// The table's contents, behind a header that fits and a checksum that is right.

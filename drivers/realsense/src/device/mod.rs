@@ -34,8 +34,8 @@ use session::Session;
 pub use setup::read as identify;
 use times::Exposed;
 
-/// A camera that sends nothing for this long is opened anew, ns. The slowest streams have a frame
-/// every 200 ms.
+/// A camera that sends no depth and colour of one time for this long is opened anew, ns: one stream
+/// can die while the other goes on. The slowest streams have a frame every 200 ms.
 const STALL_NS: i64 = 2_000_000_000;
 
 /// Which camera, and how it is set.
@@ -77,8 +77,9 @@ pub enum CameraError {
         /// Which one was asked for.
         serial: Option<String>,
     },
-    /// The camera is there and sends nothing. It is opened anew on the next read.
-    #[error("the camera has sent nothing for {silent_ns} ns: it is opened anew")]
+    /// The camera is there, and one of its streams or both are silent. It is opened anew on the next
+    /// read.
+    #[error("no frame of both streams for {silent_ns} ns: the camera is opened anew")]
     Stalled {
         /// For how long.
         silent_ns: i64,
@@ -141,7 +142,7 @@ pub struct RealSense<P: CameraPort> {
     /// The last geometry, kept while the camera is away.
     geometry: Option<RgbdGeometry>,
     identity: Option<CameraIdentity>,
-    /// Since when nothing has come.
+    /// The first deadline that passed since the last pair.
     silent_since: Option<Stamp>,
     sequence: u32,
     last_stamp: Option<Stamp>,
@@ -208,7 +209,7 @@ impl<P: CameraPort> RealSense<P> {
         }
     }
 
-    /// Nothing came by `deadline`. Too much of that is a stall.
+    /// No pair came by `deadline`. Too much of that is a stall.
     fn silence(&mut self, deadline: Stamp) -> Result<(), CameraError> {
         let since = *self.silent_since.get_or_insert(deadline);
         let silent_ns = deadline.nanos_since(since);
@@ -275,6 +276,7 @@ impl<P: CameraPort> RgbdCamera for RealSense<P> {
         while let Some(session) = &mut self.session {
             check_room(&session.geometry, &images)?;
             if let Some(times) = session.pair() {
+                self.silent_since = None;
                 session.deliver(images.depth, images.color)?;
                 return Ok(Some(self.header(times)));
             }
@@ -283,14 +285,8 @@ impl<P: CameraPort> RgbdCamera for RealSense<P> {
                 break;
             }
             match session.step(deadline) {
-                Ok(Some(arrived)) => {
-                    self.silent_since = None;
-                    late = arrived > deadline;
-                }
-                Ok(None) => {
-                    self.silence(deadline)?;
-                    break;
-                }
+                Ok(Some(arrived)) => late = arrived > deadline,
+                Ok(None) => break,
                 Err(error) => {
                     self.close();
                     self.counters.unplugged += u64::from(matches!(error, LinkError::Unplugged));
@@ -298,6 +294,7 @@ impl<P: CameraPort> RgbdCamera for RealSense<P> {
                 }
             }
         }
+        self.silence(deadline)?;
         Ok(None)
     }
 }

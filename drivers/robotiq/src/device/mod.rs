@@ -237,11 +237,20 @@ impl<L: Line, C: Clock> Gripper for Robotiq<L, C> {
     }
 
     fn stop(&mut self) -> Result<(), GripperError> {
-        let command = Command {
+        // What it was told last may be another program's word, or of before a power cut. Clearing its
+        // activation would let go of what it holds, setting it would move its fingers: it is kept as
+        // the gripper says that it is.
+        if let Some(state) = self.talk.request(Request::Read)? {
+            self.state = state;
+        }
+        if !self.state.activate {
+            return Ok(());
+        }
+        self.tell(Command {
+            activate: true,
             go: false,
             ..self.told
-        };
-        self.tell(command)
+        })
     }
 
     fn read_gripper(&mut self, deadline: Stamp) -> Result<Option<GripperSample>, GripperError> {

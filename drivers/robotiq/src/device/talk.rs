@@ -63,8 +63,8 @@ impl<L: Line, C: Clock> Talk<L, C> {
         Ok(self.wait(deadline)?.flatten().map(|state| (sent, state)))
     }
 
-    /// Makes a request and waits for its answer, again if it fails.
-    pub fn request(&mut self, request: Request) -> Result<(), GripperError> {
+    /// Makes a request and waits for its answer, again if it fails: the state, if it asks for it.
+    pub fn request(&mut self, request: Request) -> Result<Option<State>, GripperError> {
         // An answer that is still to come is heard first, so that it is not taken for this one's.
         if let Some(open) = self.open {
             let _ = self.wait(open.sent + ANSWER_NS);
@@ -74,7 +74,7 @@ impl<L: Line, C: Clock> Talk<L, C> {
             self.send(request)?;
             let limit = self.clock.now() + ANSWER_NS;
             match self.wait(limit) {
-                Ok(Some(_)) => return Ok(()),
+                Ok(Some(answer)) => return Ok(answer),
                 Ok(None) => {}
                 Err(error @ (GripperError::Silent | GripperError::Frame(_))) => failure = error,
                 Err(error) => return Err(error),

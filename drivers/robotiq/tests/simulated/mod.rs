@@ -27,6 +27,7 @@ pub enum Behaviour {
 enum Order {
     Object(Option<u8>),
     Fault(u8),
+    PowerCut,
     Behave(Vec<Behaviour>),
     HangUp,
 }
@@ -71,6 +72,11 @@ impl Simulated {
 
     pub fn fail(&self, fault: u8) {
         self.orders.send(Order::Fault(fault)).unwrap();
+    }
+
+    /// Takes its power away for a moment: it forgets that it was activated.
+    pub fn cut_power(&self) {
+        self.orders.send(Order::PowerCut).unwrap();
     }
 
     pub fn behave(&self, behaviours: Vec<Behaviour>) {
@@ -186,6 +192,7 @@ fn run(
             match order {
                 Order::Object(count) => fingers.object = count,
                 Order::Fault(fault) => fingers.state.fault = fault,
+                Order::PowerCut => fingers.obey(Command::default()),
                 Order::Behave(behaviours) => next = behaviours.into(),
                 Order::HangUp => return seen,
             }

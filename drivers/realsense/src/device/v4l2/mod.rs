@@ -43,8 +43,6 @@ const METADATA_FORMATS: [FourCc; 2] = [*b"D4XX", *b"UVCH"];
 const BUFFERS: u32 = 4;
 /// How often a camera is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// Most that a kernel stamp may lie in the past and still be believed, ns.
-const MAX_AGE_NS: i64 = 10_000_000_000;
 
 /// The cameras of this machine. `C` is the robot's clock.
 #[derive(Debug)]
@@ -81,7 +79,7 @@ impl<C: Clock + Clone, V: Video + Clone> CameraPort for V4l2Port<C, V> {
             });
             // Just plugged in, a camera has not all of its devices and rights yet.
             let opened = wanted.map(|(model, camera)| self.link(model, &camera, request));
-            let left = until(&self.clock, deadline);
+            let left = self.clock.until(deadline);
             if matches!(opened, Some(Ok(_))) || left.is_zero() {
                 return opened.transpose();
             }
@@ -264,16 +262,11 @@ impl<C: Clock, V: Video> V4l2Link<C, V> {
                 let age_ns = filled
                     .monotonic_ns
                     .map_or(0, |ns| now_ns.saturating_sub(ns));
-                let believed_ns = if (0..=MAX_AGE_NS).contains(&age_ns) {
-                    age_ns
-                } else {
-                    0
-                };
                 take(Buffer {
                     stream: *stream,
                     part: *part,
                     sequence: filled.sequence,
-                    received: clock.now() + -believed_ns,
+                    received: clock.ago(age_ns),
                     damaged: filled.damaged,
                     bytes: filled.bytes,
                 });
@@ -353,7 +346,7 @@ impl<C: Clock, V: Video> CameraLink for V4l2Link<C, V> {
             if self.take_ready(take)? {
                 return Ok(true);
             }
-            let left = until(&self.clock, deadline);
+            let left = self.clock.until(deadline);
             let waited = self.video.wait(&self.nodes, left);
             self.ready = waited.map_err(|source| LinkError::System {
                 doing: "waiting for the camera",
@@ -372,12 +365,6 @@ impl<C: Clock, V: Video> CameraLink for V4l2Link<C, V> {
             return Err(LinkError::Unplugged);
         }
     }
-}
-
-/// How long until `deadline`; zero if it has passed.
-fn until(clock: &impl Clock, deadline: Stamp) -> Duration {
-    let left_ns = deadline.nanos_since(clock.now());
-    Duration::from_nanos(u64::try_from(left_ns).unwrap_or(0))
 }
 
 /// What a system call's failure means for a camera.

@@ -1,0 +1,67 @@
+//! A RealSense's firmware: what it answers when the driver asks for itself, its tables and its unit.
+
+use hachi_hal::RgbdGeometry;
+use hachi_realsense::controls::{Query, Selector};
+use hachi_realsense::encode;
+use hachi_realsense::monitor::{DeviceInfo, MONITOR_LEN, Opcode};
+
+/// Distance between the imagers of a D455, metres: the maker's figure. No image depends on it.
+const BASELINE_M: f64 = 0.095;
+
+/// The firmware of a camera with this geometry.
+#[derive(Debug)]
+pub struct Firmware {
+    info: DeviceInfo,
+    geometry: RgbdGeometry,
+    /// The command that was written last, and its first parameter.
+    asked: [u32; 2],
+}
+
+impl Firmware {
+    /// A camera that says this of itself.
+    pub fn new(info: DeviceInfo, geometry: RgbdGeometry) -> Self {
+        Self {
+            info,
+            geometry,
+            asked: [0; 2],
+        }
+    }
+
+    /// What a control is set to, a command to the firmware among them.
+    pub fn set(&mut self, selector: Selector, bytes: &[u8]) {
+        if selector == Selector::Monitor {
+            let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+            self.asked = [number(4), number(8)];
+        }
+    }
+
+    /// What a control is, or can be: anything. Of the firmware, the answer to the last command.
+    pub fn get(&self, query: Query, bytes: &mut [u8]) {
+        if bytes.len() < MONITOR_LEN {
+            bytes.fill(if query == Query::Maximum { 0xFF } else { 0 });
+        } else {
+            bytes.copy_from_slice(&self.answer());
+        }
+    }
+
+    fn answer(&self) -> [u8; MONITOR_LEN] {
+        let geometry = &self.geometry;
+        match self.asked {
+            [0x10, _] => encode::answer(Opcode::DeviceInfo, &encode::device_info(&self.info)),
+            [0x15, 25] => {
+                let table = encode::depth_table(BASELINE_M, &[geometry.depth]);
+                encode::answer(Opcode::ReadCalibration, &table)
+            }
+            [0x15, 32] => {
+                let depth_from_color = geometry.color_from_depth.inverse();
+                let table = encode::color_table(&geometry.color, &depth_from_color);
+                encode::answer(Opcode::ReadCalibration, &table)
+            }
+            [0x2C, 9] => {
+                let unit_um = (geometry.depth_unit_m * 1e6).round() as u32;
+                encode::answer(Opcode::ReadAdvanced, &unit_um.to_le_bytes())
+            }
+            other => panic!("the driver asked {other:x?}"),
+        }
+    }
+}
