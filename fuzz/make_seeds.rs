@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use hachi_hal::{Distortion, Intrinsics, Pose, Stamp};
+use hachi_inference::known;
 use hachi_place::{Database, Describer, DescriberConfig, Descriptor, Profile};
 use hachi_realsense::encode as d400;
 use hachi_realsense::frame as d400_frame;
@@ -343,6 +344,15 @@ fn map_file() -> Result<Vec<u8>> {
     fs::read(&path)
 }
 
+/// A model of `ir_version` 8 whose graph has one node with an input named x; a detector's manifest.
+fn onnx_file() -> Vec<Vec<u8>> {
+    let manifest = known::manifest("yolox_nano_416x416").expect("it is known");
+    vec![
+        vec![0x08, 8, 0x3A, 5, 0x0A, 3, 0x0A, 1, b'x'],
+        manifest.into(),
+    ]
+}
+
 fn with_switches(switches: u8, payload: Vec<u8>) -> Vec<u8> {
     [vec![switches], payload].concat()
 }
@@ -357,7 +367,7 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 20] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 21] = [
         ("canbus", canbus()),
         ("imu", imu()),
         ("realsense", realsense()),
@@ -415,6 +425,7 @@ fn main() -> Result<()> {
                 .map(|kind| with_switches(kind, leg_numbers()))
                 .collect(),
         ),
+        ("onnx_file", onnx_file()),
         (
             "mot_text",
             vec![

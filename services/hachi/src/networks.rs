@@ -2,7 +2,8 @@
 //!
 //! Named on the command line, or taken from a folder of models: `--models`, else `HACHI_MODELS`,
 //! else `models` in `HACHI_DATA`. In a folder the first model of each kind is taken, published ones
-//! (`hachi_inference::known`) before others.
+//! (`hachi_inference::known`) before others; one whose manifest can't be read is left out and said
+//! in the log.
 
 use std::path::{Path, PathBuf};
 
@@ -87,9 +88,13 @@ fn find(
         known.unwrap_or(known::KNOWN.len())
     };
     models.sort_by(|a, b| order(a).cmp(&order(b)).then(a.cmp(b)));
-    let fits = |path: &PathBuf| {
-        let manifest = manifest_of(path, &LoadOptions::default());
-        manifest.is_ok_and(|manifest| right(&manifest.decoder))
+    let fits = |path: &PathBuf| match manifest_of(path, &LoadOptions::default()) {
+        Ok(manifest) => right(&manifest.decoder),
+        Err(LoadError::NoManifest { .. }) => false,
+        Err(error) => {
+            tracing::warn!(%error, "model left out");
+            false
+        }
     };
     Ok(models.into_iter().find(fits))
 }

@@ -3,6 +3,7 @@
 mod program;
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use program::{file, recording, run, text};
 
@@ -13,6 +14,21 @@ fn walk() -> String {
         let _ = writeln!(lines, "{frame},-1,{},50,40,100,0.9", 2 * frame);
     }
     lines
+}
+
+/// What `hachi eval tracks` says.
+#[track_caller]
+fn evaluated(reference: &Path, estimate: &Path) -> serde_json::Value {
+    run(&[
+        "eval",
+        "tracks",
+        "--reference",
+        text(reference),
+        "--estimate",
+        text(estimate),
+        "--json",
+    ])
+    .json()
 }
 
 #[test]
@@ -34,16 +50,7 @@ fn detections_become_tracks_that_the_evaluation_accepts() {
         .map(|frame| format!("{frame},1,{},50,40,100,1\n", 2 * frame))
         .collect();
     let truth = file(folder.path(), "gt.txt", &truth);
-    let metrics = run(&[
-        "eval",
-        "tracks",
-        "--reference",
-        text(&truth),
-        "--estimate",
-        text(&tracks),
-        "--json",
-    ])
-    .json();
+    let metrics = evaluated(&truth, &tracks);
     assert_eq!(
         (&metrics["mota"], &metrics["idf1"]),
         (&1.0.into(), &1.0.into())
@@ -78,16 +85,7 @@ fn metrics_of_a_real_result_are_the_published_ones() {
         return;
     };
     let sequence = people.join("tud/TUD-Campus");
-    let metrics = run(&[
-        "eval",
-        "tracks",
-        "--json",
-        "--reference",
-        text(&sequence.join("gt.txt")),
-        "--estimate",
-        text(&sequence.join("test.txt")),
-    ])
-    .json();
+    let metrics = evaluated(&sequence.join("gt.txt"), &sequence.join("test.txt"));
     let counts = ["fp", "fn", "ids", "mt", "ml"].map(|key| metrics[key].as_u64().unwrap());
     assert_eq!(counts, [13, 150, 7, 1, 1]);
     assert!((metrics["mota"].as_f64().unwrap() - 0.526).abs() < 5e-4);
@@ -95,7 +93,7 @@ fn metrics_of_a_real_result_are_the_published_ones() {
 }
 
 /// A folder of frames: three of a real sequence.
-fn real_frames(people: &std::path::Path, folder: &std::path::Path) {
+fn real_frames(people: &Path, folder: &Path) {
     let from = people.join("MOT17-mini/train/MOT17-04-FRCNN/img1");
     for name in ["000001.jpg", "000002.jpg", "000003.jpg"] {
         std::fs::copy(from.join(name), folder.join(name)).unwrap();
@@ -114,7 +112,7 @@ fn people_in_real_images_keep_their_numbers() {
     // What is no image costs one frame, and is said.
     std::fs::write(frames.join("000004.jpg"), b"\xFF\xD8 cut short").unwrap();
     let tracks = folder.path().join("tracks.txt");
-    let run = run(&[
+    let out = run(&[
         "people",
         "track",
         text(&frames),
@@ -125,20 +123,11 @@ fn people_in_real_images_keep_their_numbers() {
         "--json",
         "--log",
         "error",
-    ]);
-    let out = run.json();
-    assert_eq!((&out["frames"], &out["unreadable"]), (&4.into(), &1.into()));
-    let truth = people.join("MOT17-mini/train/MOT17-04-FRCNN/gt/gt.txt");
-    let metrics = program::run(&[
-        "eval",
-        "tracks",
-        "--reference",
-        text(&truth),
-        "--estimate",
-        text(&tracks),
-        "--json",
     ])
     .json();
+    assert_eq!((&out["frames"], &out["unreadable"]), (&4.into(), &1.into()));
+    let truth = people.join("MOT17-mini/train/MOT17-04-FRCNN/gt/gt.txt");
+    let metrics = evaluated(&truth, &tracks);
     assert_eq!(metrics["ids"], 0);
     assert!(metrics["precision"].as_f64().unwrap() > 0.8, "{metrics}");
     // Three frames make only the surest a person.
@@ -186,6 +175,39 @@ fn the_person_of_a_picture_is_found_and_nobody_else() {
 }
 
 #[test]
+fn frames_that_are_none_and_impossible_distances_are_refused() {
+    let Some(people) = recording("people") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("1.jpg"), b"\xFF\xD8 cut short").unwrap();
+    let query = people.join("person_search/query/0001_c1s1_001051_00.jpg");
+    let find = |distance: &str| {
+        let distance = format!("--max-distance={distance}");
+        let query = text(&query);
+        run(&[
+            "people",
+            "find",
+            text(folder.path()),
+            "--query",
+            query,
+            &distance,
+        ])
+    };
+    let failed = find("0.4");
+    let line = failed.failure();
+    assert!(
+        line.contains("no frame can be looked at") && line.contains("1.jpg"),
+        "{line}"
+    );
+    for distance in ["nan", "-0.1", "near"] {
+        let refused = find(distance);
+        assert_eq!(refused.status, 2);
+        assert!(refused.stderr.contains("from 0"), "{}", refused.stderr);
+    }
+}
+
+#[test]
 fn a_model_is_checked_against_its_manifest() {
     let Some(models) = recording("models") else {
         return;
@@ -225,4 +247,27 @@ fn without_a_network_it_is_said_what_to_do() {
         "{}",
         failed.stderr
     );
+}
+
+#[test]
+fn a_manifest_that_can_t_be_read_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["1.jpg", "mine.onnx"] {
+        std::fs::write(folder.path().join(name), b"x").unwrap();
+    }
+    file(folder.path(), "mine.toml", "abuot = \"a detector\"");
+    let failed = run(&[
+        "people",
+        "track",
+        text(folder.path()),
+        "--models",
+        text(folder.path()),
+        "--out",
+        text(&folder.path().join("t.txt")),
+        "--log",
+        "warn",
+    ]);
+    let said = &failed.stderr;
+    let named = ["model left out", "mine.toml", "abuot", "holds no detector"];
+    assert!(named.iter().all(|part| said.contains(part)), "{said}");
 }

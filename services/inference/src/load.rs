@@ -162,6 +162,16 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
         manifest
             .check_output(index, images, output.shape())
             .map_err(wrong)?;
+        if !output.values().iter().all(|v| v.is_finite()) {
+            let announced = model.signature().outputs.get(index);
+            return Err(LoadError::Trial {
+                path: path.to_owned(),
+                source: RunError::Output {
+                    name: announced.map_or_else(String::new, |port| port.name.clone()),
+                    found: "not all finite numbers".to_owned(),
+                },
+            });
+        }
     }
     Ok(Loaded { manifest, model })
 }

@@ -5,13 +5,18 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Port, Signature};
+use crate::model::{Port, Signature, shape_text};
 
 /// No model takes a larger image than this on a side, pixels.
 const MAX_SIDE: usize = 4096;
 
 /// Cells of YOLO's coarsest grid are so many pixels wide.
 const COARSEST: usize = 32;
+
+/// Cells of YOLACT's finest grid are so many pixels wide, those of the next twice as many.
+const YOLACT_FINEST: usize = 8;
+/// More anchors than this are a mistake: YOLACT++ with its nine in each cell has 57 744.
+const MAX_ANCHORS: usize = 1_000_000;
 
 /// A model's description.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -162,7 +167,7 @@ pub enum Decoder {
     Appearance {
         /// Numbers in a feature.
         length: usize,
-        /// Whether features are compared by direction alone.
+        /// Whether features are brought to unit length. Cosine distances go by direction either way.
         normalise: bool,
         /// Two features are of one person up to this distance (1 - cosine).
         same_person_distance: f64,
@@ -171,6 +176,23 @@ pub enum Decoder {
 
 fn yolact_ratios() -> Vec<f64> {
     vec![1.0, 0.5, 2.0]
+}
+
+/// Columns and rows of YOLACT's grid on a level, from 0, for an input of this size.
+pub fn yolact_grid([width, height]: [usize; 2], level: usize) -> [usize; 2] {
+    // From the tenth level on, one cell holds the largest image.
+    let cell = YOLACT_FINEST << level.min(9);
+    [width.div_ceil(cell), height.div_ceil(cell)]
+}
+
+/// Anchors of all levels.
+fn yolact_anchors(input: &InputLayout, scales: &[Vec<f64>], ratios: &[f64]) -> usize {
+    let levels = scales.iter().enumerate().map(|(level, scales)| {
+        let [columns, rows] = yolact_grid([input.width, input.height], level);
+        let factors = [columns, rows, scales.len(), ratios.len()];
+        factors.into_iter().fold(1, usize::saturating_mul)
+    });
+    levels.fold(0, usize::saturating_add)
 }
 
 /// Why a manifest or a model is refused.
@@ -290,6 +312,11 @@ impl Manifest {
                         "sizes above 0 for each level",
                     );
                 }
+                let anchors = yolact_anchors(input, scales, aspect_ratios);
+                if !(1..=MAX_ANCHORS).contains(&anchors) {
+                    let found = format!("{anchors} anchors");
+                    return value("decoder.scales", found, "1 to 1000000 anchors");
+                }
                 (classes, person, even_score)
             }
         };
@@ -342,13 +369,18 @@ impl Manifest {
             Decoder::Yolact {
                 classes,
                 coefficients,
+                scales,
+                aspect_ratios,
                 ..
-            } => vec![
-                vec![n, None, Some(4)],
-                vec![n, None, Some(1 + classes)],
-                vec![n, None, Some(*coefficients)],
-                vec![n, None, None, Some(*coefficients)],
-            ],
+            } => {
+                let anchors = Some(yolact_anchors(&self.input, scales, aspect_ratios));
+                vec![
+                    vec![n, anchors, Some(4)],
+                    vec![n, anchors, Some(1 + classes)],
+                    vec![n, anchors, Some(*coefficients)],
+                    vec![n, None, None, Some(*coefficients)],
+                ]
+            }
             Decoder::Appearance { length, .. } => vec![vec![n, Some(*length)]],
         }
     }
@@ -400,7 +432,7 @@ impl Manifest {
                 .is_none_or(|found| agree(found, shape));
             if !(fits && output.is_f32) {
                 let what = format!("output {:?}", output.name);
-                return mismatch(what, describe(shape), output.to_string());
+                return mismatch(what, shape_text(shape), output.to_string());
             }
         }
         Ok(())
@@ -422,7 +454,7 @@ impl Manifest {
             Some(expected) if agree(&found, expected) => Ok(()),
             expected => Err(ManifestError::Mismatch {
                 what: format!("output {index}"),
-                expected: expected.map_or_else(|| "none".to_owned(), |e| describe(e)),
+                expected: expected.map_or_else(|| "none".to_owned(), |e| shape_text(e)),
                 found: format!("{shape:?}"),
             }),
         }
@@ -441,12 +473,4 @@ fn agree(a: &[Option<usize>], b: &[Option<usize>]) -> bool {
         _ => true,
     };
     a.len() == b.len() && a.iter().zip(b).all(same)
-}
-
-fn describe(shape: &[Option<usize>]) -> String {
-    let sizes: Vec<_> = shape
-        .iter()
-        .map(|d| d.map_or_else(|| "any".to_owned(), |d| d.to_string()))
-        .collect();
-    format!("[{}]", sizes.join(", "))
 }

@@ -58,23 +58,20 @@ impl fmt::Display for Port {
         write!(f, "{:?} ", self.name)?;
         match &self.shape {
             None => f.write_str("of any shape")?,
-            Some(shape) => {
-                f.write_str("[")?;
-                for (i, dimension) in shape.iter().enumerate() {
-                    let comma = if i == 0 { "" } else { ", " };
-                    match dimension {
-                        Some(size) => write!(f, "{comma}{size}")?,
-                        None => write!(f, "{comma}any")?,
-                    }
-                }
-                f.write_str("]")?;
-            }
+            Some(shape) => f.write_str(&shape_text(shape))?,
         }
         if !self.is_f32 {
             f.write_str(", not single precision")?;
         }
         Ok(())
     }
+}
+
+/// A shape in words: `[any, 3]`.
+pub fn shape_text(shape: &[Option<usize>]) -> String {
+    let size = |size: &Option<usize>| size.map_or_else(|| "any".to_owned(), |s| s.to_string());
+    let sizes: Vec<_> = shape.iter().map(size).collect();
+    format!("[{}]", sizes.join(", "))
 }
 
 /// Why a model gave no answer.

@@ -1,10 +1,11 @@
 //! An image, or a part of it, at another size.
 //!
 //! In: RGB pixels and a region. Out: RGB in whole numbers, as networks saw them when they were
-//! trained: OpenCV and Pillow round to 8 bits, Pillow after either sum. Each output pixel is a sum
-//! of the pixels around it, weighted by a triangle: one pixel wide on either side as in OpenCV's
-//! `INTER_LINEAR`, or, for images that shrink, as wide as a pixel of the output, as in Pillow's
-//! `BILINEAR`. Columns and rows are summed one after the other.
+//! trained. Each output pixel is a sum of the pixels around it, weighted by a triangle: one pixel
+//! wide on either side as in OpenCV's `INTER_LINEAR`, or, for images that shrink, as wide as a pixel
+//! of the output, as in Pillow's `BILINEAR`. Columns and rows are summed one after the other, and
+//! either sum is rounded to a whole number with halves up, as in Pillow; OpenCV rounds once, at the
+//! end, which can differ from this by one.
 //!
 //! Libraries for this instantiate themselves for every type of pixel in the crate that calls them,
 //! which took longer to build than everything else here.

@@ -9,7 +9,7 @@
 //! | [`bounding_box`] | [`BoundingBox`]: a rectangle in an image |
 //! | [`detect`] | people and things in an image, from the outputs of YOLO and YOLACT networks |
 //! | [`appearance`] | what people look like, as features |
-//! | [`gallery`] | how far a feature lies from the pictures of a person |
+//! | [`gallery`] | how features compare, and how far one lies from the pictures of a person |
 //! | [`observe`] | from an image to people with features |
 //! | [`track`] | the tracker: Kalman boxes, gated assignment, birth and death |
 //! | [`identify`] | which of them is the robot's person: FollowMe and CARPE-ID |

@@ -107,7 +107,6 @@ pub fn track_detections(
             dt_s: 1.0 / frames_per_second,
             detections,
             features: None,
-            image_motion: None,
         });
         history.note(frame, tracker.tracks());
     };

@@ -61,10 +61,7 @@ fn as_many_people_are_found_as_by_the_reference() {
     };
     let [first, second] = ["MOT17-02-FRCNN", "MOT17-04-FRCNN"].map(&mut found_in);
     eprintln!("found of people taller than 150 pixels: {first:?}, {second:?}");
-    assert!(
-        first.0 + 1 >= 5 && second.0 + 2 >= 17,
-        "{first:?} {second:?}"
-    );
+    assert!(first.0 >= 5 && second.0 >= 17, "{first:?} {second:?}");
 }
 
 #[test]

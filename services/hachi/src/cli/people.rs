@@ -77,7 +77,7 @@ pub struct PeopleFindArguments {
     #[arg(value_name = "INPUT")]
     pub input: Option<PathBuf>,
     /// How far features of one person may lie apart (1 - cosine) [default: what the manifest says].
-    #[arg(long, value_name = "DISTANCE")]
+    #[arg(long, value_name = "DISTANCE", value_parser = distance)]
     pub max_distance: Option<f64>,
     /// The networks.
     #[command(flatten)]
@@ -105,6 +105,14 @@ pub struct EvalTracksArguments {
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
+}
+
+/// A distance between features.
+fn distance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value >= 0.0 => Ok(value),
+        _ => Err("expected a number from 0 (the same) to 2 (opposite)".to_owned()),
+    }
 }
 
 /// Frames a second, within what cameras do.

@@ -1,6 +1,7 @@
 //! What a decoder makes of a network's numbers, and what it refuses.
 
 use hachi_inference::Tensor;
+use hachi_inference::model::shape_text;
 
 use crate::BoundingBox;
 
@@ -53,7 +54,7 @@ pub(super) fn output<const N: usize>(
     let shape = shape.filter(|found| expected.iter().zip(found).all(fits));
     let shape = shape.ok_or_else(|| DecodeError::Shape {
         output: index,
-        expected: describe(&expected),
+        expected: shape_text(&expected),
         found: found.to_vec(),
     })?;
     let values = outputs[index].values();
@@ -61,14 +62,6 @@ pub(super) fn output<const N: usize>(
         Some(at) => Err(DecodeError::NotANumber { output: index, at }),
         None => Ok((shape, values)),
     }
-}
-
-fn describe(expected: &[Option<usize>]) -> String {
-    let sizes: Vec<_> = expected
-        .iter()
-        .map(|size| size.map_or_else(|| "any".to_owned(), |size| size.to_string()))
-        .collect();
-    format!("[{}]", sizes.join(", "))
 }
 
 /// The largest of some scores, and where it stands. The first of equals.

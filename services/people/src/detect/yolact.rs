@@ -5,13 +5,12 @@
 //! code). Scores are likelihoods with the background first; recipes have been through tanh.
 
 use hachi_inference::Tensor;
+use hachi_inference::manifest::yolact_grid;
 
 use super::candidate::{Candidate, DecodeError, best, output};
 use super::mask::{Prototypes, RecipeTable};
 use crate::BoundingBox;
 
-/// Pixels of the input from one cell of the first level to the next.
-const FIRST_STRIDE: usize = 8;
 const MIDDLE_VARIANCE: f64 = 0.1;
 const SIZE_VARIANCE: f64 = 0.2;
 
@@ -30,8 +29,7 @@ impl Anchors {
     ) -> Self {
         let mut anchors = Vec::new();
         for (level, scales) in scales.iter().enumerate() {
-            let stride = FIRST_STRIDE << level.min(16);
-            let (columns, rows) = (width.div_ceil(stride), height.div_ceil(stride));
+            let [columns, rows] = yolact_grid([width, height], level);
             for cell in 0..columns * rows {
                 let share = |index: usize, count: usize| (index as f64 + 0.5) / count as f64;
                 let middle = [

@@ -2,7 +2,10 @@
 //! the mean their own features lie.
 //!
 //! In: features of the person, one after the other or all at once. Out: the statistical distance
-//! `d(x) = sqrt(1/D sum(((x_i - mu_i) / sigma_i)^2))` and the threshold `lambda = mu_d + 2 sigma_d`.
+//! `d(x) = sqrt(1/D sum(((x_i - mu_i) / sigma_i)^2))` and the threshold `lambda = mu_d + 2 sigma_d`,
+//! which is never less than one deviation, for FollowMe's calibrated models either.
+
+use crate::gallery::is_feature;
 
 /// Averages forget what is older than so many updates (about ten seconds of a camera).
 const MOST_UPDATES: u32 = 100;
@@ -49,7 +52,9 @@ impl AppearanceModel {
         let count = modelled.len() as f32;
         model.mean.fill(0.0);
         for feature in modelled {
-            add(&mut model.mean, feature, |x, _| x / count);
+            for (m, x) in model.mean.iter_mut().zip(*feature) {
+                *m += x / count;
+            }
         }
         let mean = model.mean.clone();
         for feature in modelled {
@@ -70,7 +75,8 @@ impl AppearanceModel {
         let off = distances.iter().map(|d| (d - model.distance_mean).powi(2));
         model.distance_variance = off.sum::<f64>() / count;
         model.updates = modelled.len().min(MOST_UPDATES as usize) as u32;
-        model.threshold().is_finite().then_some(model)
+        let sound = model.distance_mean.is_finite() && model.distance_variance.is_finite();
+        sound.then_some(model)
     }
 
     /// Numbers in a feature.
@@ -133,19 +139,9 @@ fn weight(updates: u32, damping: f64) -> f64 {
     (2.0 / (f64::from(updates) * damping.max(1.0) + 1.0)).min(1.0)
 }
 
-fn is_feature(feature: &[f32]) -> bool {
-    feature.iter().all(|x| x.is_finite()) && feature.iter().any(|x| *x != 0.0)
-}
-
 fn least_deviation(feature: &[f32]) -> f32 {
     let squares: f32 = feature.iter().map(|x| x * x).sum();
     LEAST_DEVIATION * (squares / feature.len() as f32).sqrt()
-}
-
-fn add(sums: &mut [f32], feature: &[f32], part: impl Fn(f32, f32) -> f32) {
-    for (sum, x) in sums.iter_mut().zip(feature) {
-        *sum += part(*x, *sum);
-    }
 }
 
 #[cfg(test)]
@@ -159,6 +155,31 @@ mod tests {
         assert_eq!(weight(3, 0.2), 0.5);
         assert_eq!(weight(3, 2.0), 2.0 / 7.0);
         assert_eq!(weight(3, f64::INFINITY), 0.0);
+    }
+
+    #[test]
+    fn near_features_weigh_less_for_the_mean_and_far_ones_for_the_threshold() {
+        // Updates by hand. The first leaves distances of 0 +- 1, so that the threshold is 2.
+        let known = || {
+            let mut model = AppearanceModel::first(&[1.0, 0.0]).unwrap();
+            model.learn(&[1.0, 0.0], 0.0);
+            model
+        };
+        // Near: damping 4 for the feature (alpha 0.4), none for the threshold (alpha 1).
+        let mut model = known();
+        model.learn(&[0.0, 1.0], 0.5);
+        assert!((model.threshold() - 1.5).abs() < 1e-6, "{model:?}");
+        // Mean (0.6, 0.4), variance 0.4 each: 1 / 0.4 / 2.
+        let distance = model.distance(&[1.6, 0.4]);
+        assert!((distance - 1.25_f64.sqrt()).abs() < 1e-5, "{distance}");
+        // Far: none for the feature (alpha 1), 4 for the threshold (alpha 0.4).
+        let mut model = known();
+        model.learn(&[0.0, 1.0], 4.0);
+        let expected = 1.6 + 2.0 * 7.0_f64.sqrt();
+        assert!((model.threshold() - expected).abs() < 1e-6, "{model:?}");
+        // Mean (0, 1), variance 1 each: 4 / 1 / 2.
+        let distance = model.distance(&[2.0, 1.0]);
+        assert!((distance - 2.0_f64.sqrt()).abs() < 1e-5, "{distance}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! seen the person from all sides.
 
 use super::AppearanceModel;
+use crate::gallery::is_feature;
 
 /// Fewer features leave a threshold to chance.
 pub const FEWEST: usize = 9;
@@ -21,7 +22,7 @@ pub enum CalibrationError {
         /// How often at least.
         needed: usize,
     },
-    /// All features were the same, or none.
+    /// They cancel out or are too large: no distance can be taken.
     #[error("the features say nothing about the person")]
     Nothing,
 }
@@ -46,8 +47,7 @@ impl Calibration {
     /// out.
     pub fn push(&mut self, feature: &[f32]) {
         let length = self.features.first().map_or(feature.len(), Vec::len);
-        let says = feature.iter().all(|x| x.is_finite()) && feature.iter().any(|x| *x != 0.0);
-        if says && feature.len() == length && !self.is_complete() {
+        if is_feature(feature) && feature.len() == length && !self.is_complete() {
             self.features.push(feature.to_vec());
         }
     }
@@ -65,7 +65,7 @@ impl Calibration {
     /// The model of what was taken.
     ///
     /// # Errors
-    /// Fewer than [`FEWEST`] features.
+    /// Fewer than [`FEWEST`] features, or none that a distance can be taken from.
     pub fn finish(&self) -> Result<AppearanceModel, CalibrationError> {
         if self.features.len() < FEWEST {
             return Err(CalibrationError::TooFew {
@@ -99,6 +99,18 @@ mod tests {
         assert!((model.distance(&[0.0, 5.0]) - (9.0_f64 / 2.0).sqrt()).abs() < 1e-6);
         // Distances held back: 0, 0 and 2.1213: mean 0.7071, deviation 1.
         assert!((model.threshold() - (0.5_f64.sqrt() + 2.0)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn features_that_cancel_out_or_are_too_large_are_said() {
+        for size in [1.0, 1e30] {
+            let mut calibration = Calibration::new(9);
+            for k in 0..9 {
+                let sign = if k % 2 == 0 { size } else { -size };
+                calibration.push(&[sign, 0.0]);
+            }
+            assert_eq!(calibration.finish(), Err(CalibrationError::Nothing));
+        }
     }
 
     #[test]

@@ -5,8 +5,8 @@
 //! the while what they look like is learnt.
 //!
 //! As the publication's Algorithm 1, with what it leaves open: the distance is computed for a person
-//! matched by track too; while a person's track goes on, everybody else in the image is a distractor
-//! and stays one until their track ends (the blacklist).
+//! matched by track too; in frames where a person's track looks like them, everybody else in the
+//! image is a distractor and stays one until their track ends (the blacklist).
 
 use super::AppearanceModel;
 use crate::track::{Features, Track};
@@ -51,7 +51,7 @@ pub struct Status {
     pub person: PersonId,
     /// In one word.
     pub condition: Condition,
-    /// Which track, if they are in view.
+    /// Their track; while they are not in view the last one, `None` if there was none.
     pub track: Option<u64>,
     /// How much they look like themselves: 1 at no distance, a half at the threshold, 0 from twice
     /// the threshold on; 0 if not in view, the last one if they are hidden in part.
@@ -345,7 +345,6 @@ mod tests {
                 dt_s: DT_S,
                 detections: &detections,
                 features: None,
-                image_motion: None,
             });
             let features = Features {
                 dimension: 4,

@@ -8,7 +8,6 @@
 //! person, which stands for the distance (as in SORT's followers: Wojke, Bewley and Paulus, ICIP
 //! 2017); time is in seconds, so that the rate of frames is of no matter.
 
-use super::image_motion::ImageMotion;
 use crate::BoundingBox;
 
 /// A detector's box is off by so much of the height (standard deviation).
@@ -67,18 +66,6 @@ impl Axis {
         self.covariance *= 1.0 - gain;
         self.value_variance *= 1.0 - gain;
     }
-
-    fn scale(&mut self, by: f64) {
-        self.value *= by;
-        self.rate *= by;
-        for variance in [
-            &mut self.value_variance,
-            &mut self.covariance,
-            &mut self.rate_variance,
-        ] {
-            *variance *= by * by;
-        }
-    }
 }
 
 /// A box that moves.
@@ -124,29 +111,9 @@ impl BoxFilter {
         self.height.value = self.height.value.max(LEAST_SIZE);
     }
 
-    /// The image moved under the box.
-    pub(super) fn follow(&mut self, motion: &ImageMotion) {
-        let Some(local) = motion.at([self.x.value, self.y.value]) else {
-            return;
-        };
-        let (vx, vy) = (self.x.rate, self.y.rate);
-        for axis in [&mut self.x, &mut self.y, &mut self.width, &mut self.height] {
-            axis.scale(local.scale);
-        }
-        [self.x.value, self.y.value] = local.to;
-        let j = local.jacobian;
-        self.x.rate = j[0][0] * vx + j[0][1] * vy;
-        self.y.rate = j[1][0] * vx + j[1][1] * vy;
-    }
-
     pub(super) fn bounding_box(&self) -> BoundingBox {
         let middle = [self.x.value, self.y.value];
         BoundingBox::around(middle, self.width.value, self.height.value)
-    }
-
-    /// Pixels a second.
-    pub(super) fn velocity(&self) -> [f64; 2] {
-        [self.x.rate, self.y.rate]
     }
 
     /// How sure the middle is: standard deviation along x and y, pixels.
@@ -178,7 +145,7 @@ mod tests {
             filter.predict(0.04);
             filter.update(&at(0.04 * f64::from(k)));
         }
-        assert!((filter.velocity()[0] - 60.0).abs() < 1.0, "{filter:?}");
+        assert!((filter.x.rate - 60.0).abs() < 1.0, "{filter:?}");
         let sure = filter.deviation()[0];
         filter.predict(0.5);
         let expected = at(2.5).middle();

@@ -2,6 +2,7 @@
 
 use super::filter::BoxFilter;
 use crate::BoundingBox;
+use crate::gallery::cosine_distance;
 
 /// Whether a track is believed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,11 +45,6 @@ impl Track {
         self.filter.bounding_box()
     }
 
-    /// How it moves in the image, pixels a second.
-    pub fn velocity(&self) -> [f64; 2] {
-        self.filter.velocity()
-    }
-
     /// Whether it is seen in this frame.
     pub fn is_seen(&self) -> bool {
         self.detection.is_some()
@@ -59,27 +55,30 @@ impl Track {
         self.state == TrackState::Confirmed
     }
 
-    /// One minus the cosine of the angle between its appearance and a feature of unit length.
+    /// One minus the cosine of the angle between its appearance and a feature.
     pub(super) fn appearance_distance(&self, feature: &[f32]) -> Option<f64> {
         let comparable = !self.feature.is_empty() && self.feature.len() == feature.len();
-        comparable.then(|| {
-            let dot: f32 = self.feature.iter().zip(feature).map(|(a, b)| a * b).sum();
-            f64::from(1.0 - dot)
-        })
+        comparable.then(|| cosine_distance(&self.feature, feature))
     }
 
+    /// Turns its appearance towards a feature, whose direction alone counts.
     pub(super) fn learn(&mut self, feature: &[f32]) {
         if self.feature.len() != feature.len() {
             self.feature.clear();
-            self.feature.extend_from_slice(feature);
-        } else {
-            for (mean, new) in self.feature.iter_mut().zip(feature) {
-                *mean = FEATURE_KEPT * *mean + (1.0 - FEATURE_KEPT) * new;
-            }
+            self.feature.resize(feature.len(), 0.0);
         }
-        let length = self.feature.iter().map(|v| v * v).sum::<f32>().sqrt();
+        let share = f64::from(1.0 - FEATURE_KEPT) / length(feature);
+        for (mean, new) in self.feature.iter_mut().zip(feature) {
+            *mean = FEATURE_KEPT * *mean + (share * f64::from(*new)) as f32;
+        }
+        let length = length(&self.feature) as f32;
         if length > 0.0 {
             self.feature.iter_mut().for_each(|v| *v /= length);
         }
     }
+}
+
+fn length(feature: &[f32]) -> f64 {
+    let squares = feature.iter().map(|v| f64::from(*v).powi(2));
+    squares.sum::<f64>().sqrt()
 }

@@ -1,10 +1,10 @@
 //! The tracker: [`Tracker::step`] reads from top to bottom.
 
 use super::filter::BoxFilter;
-use super::image_motion::ImageMotion;
 use super::single::{Track, TrackState};
 use crate::BoundingBox;
 use crate::assignment::{Assignment, CostMatrix};
+use crate::gallery::is_feature;
 
 /// What a detector found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Detection {
 pub struct Features<'a> {
     /// Numbers in each feature.
     pub dimension: usize,
-    /// One feature after the other, each of unit length.
+    /// One feature after the other.
     pub values: &'a [f32],
     /// Two features are of one person up to this distance (1 - cosine): a property of the network.
     pub same_person_distance: f64,
@@ -31,9 +31,7 @@ impl<'a> Features<'a> {
     pub fn get(&self, detection: usize) -> Option<&'a [f32]> {
         let begin = detection.checked_mul(self.dimension)?;
         let feature = self.values.get(begin..begin.checked_add(self.dimension)?)?;
-        // Zeros stand for nobody seen.
-        (feature.iter().all(|v| v.is_finite()) && feature.iter().any(|v| *v != 0.0))
-            .then_some(feature)
+        is_feature(feature).then_some(feature)
     }
 }
 
@@ -46,8 +44,6 @@ pub struct Frame<'a> {
     pub detections: &'a [Detection],
     /// What they look like.
     pub features: Option<Features<'a>>,
-    /// How the image moved since the last frame.
-    pub image_motion: Option<ImageMotion>,
 }
 
 /// How people are tracked.
@@ -168,9 +164,6 @@ impl Tracker {
             track.detection = None;
             track.unseen_s += dt_s;
             track.filter.predict(dt_s);
-            if let Some(motion) = &frame.image_motion {
-                track.filter.follow(motion);
-            }
         }
     }
 

@@ -42,7 +42,7 @@ struct Sighting {
 /// Runs the command.
 ///
 /// # Errors
-/// There is no network, or no picture of the person can be used.
+/// There is no network, no picture of the person can be used, or no frame can be looked at.
 pub fn run(arguments: &PeopleFindArguments) -> Result<(), Failure> {
     let (queries, input) = split(arguments)?;
     let frames = match input.is_dir() {
@@ -72,6 +72,16 @@ pub fn run(arguments: &PeopleFindArguments) -> Result<(), Failure> {
         sightings.push(search(&mut observer, &looks, frame, max_distance));
     }
     bar.finish_and_clear();
+    let mut reasons = sightings.iter().map(|sighting| &sighting.error);
+    if let (Some(Some(first)), true) = (reasons.next(), reasons.all(Option::is_some)) {
+        return Err(Failure::new(
+            format_args!(
+                "no frame can be looked at: {}: {first}",
+                frames[0].path.display()
+            ),
+            "give JPEG or PNG images",
+        ));
+    }
     let summary = Summary {
         found: sightings.iter().filter(|sighting| sighting.found).count(),
         max_distance,

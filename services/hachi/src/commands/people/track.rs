@@ -117,7 +117,6 @@ fn through_images(
                 dt_s: since as f64 / frames_per_second,
                 detections: observed.detections,
                 features: observed.features,
-                image_motion: None,
             });
             history.note(frame.number, tracker.tracks());
             Ok(())
@@ -137,10 +136,10 @@ fn through_images(
     let tracks = history.finish(longest_gap(frames_per_second));
     let known: BTreeSet<u64> = frames.iter().map(|frame| frame.number).collect();
     // Between the frames of a thinned-out recording there is nothing to draw a box on.
-    let tracks: Vec<_> = tracks
+    let drawn = tracks
         .into_iter()
-        .filter(|line| known.contains(&line.frame))
-        .collect();
+        .filter(|line| known.contains(&line.frame));
+    let tracks = drawn.map(counted_from_1).collect();
     let summary = Summary {
         frames: frames.len(),
         detections,
@@ -151,6 +150,13 @@ fn through_images(
         time_ms: begun.elapsed().as_secs_f64() * 1e3,
     };
     Ok((tracks, summary))
+}
+
+/// MOTChallenge counts pixels from 1, networks from 0.
+fn counted_from_1(mut line: MotLine) -> MotLine {
+    line.bounding_box.left += 1.0;
+    line.bounding_box.top += 1.0;
+    line
 }
 
 fn text(summary: &Summary, out: &Path) -> String {
