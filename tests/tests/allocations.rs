@@ -1,39 +1,22 @@
 //! From packet to pose nothing is allocated once everything has been seen at its largest.
-#![allow(unsafe_code, reason = "counting allocations takes a global allocator")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::alloc::System;
 
 use hachi_cloud::{FilterConfig, Filters, ScanFrames};
 use hachi_hal::{LidarScans, PacketSource, Received, Stamp};
 use hachi_odometry::{Odometry, OdometryConfig, ScanInput};
 use hachi_velodyne::{VelodyneConfig, VelodyneScans};
 use hachi_world::{Preset, Simulation, SimulationConfig};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is handed to the system's allocator unchanged; counting touches no memory.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.dealloc(at, layout) }
-    }
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.realloc(at, layout, size) }
-    }
-}
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+/// Allocations of the whole process so far, those among them that made a block larger too.
+fn allocations() -> usize {
+    let stats = ALLOCATOR.stats();
+    stats.allocations + stats.reallocations
+}
 
 /// Packets from memory, so that making them is not counted.
 struct Recorded {
@@ -78,13 +61,13 @@ fn from_packet_to_pose_nothing_is_allocated_once_warm() {
     let counts = pool.install(|| {
         let mut counts = Vec::with_capacity(200);
         while !scans.at_end() {
-            let before = ALLOCATIONS.load(Ordering::Relaxed);
+            let before = allocations();
             let Ok(Some(header)) = scans.read_scan(&mut points, Stamp::from_nanos(i64::MAX)) else {
                 continue;
             };
             filters.step(&points, &ScanFrames::default(), &mut kept);
             odometry.step(&ScanInput::new(&header, &kept));
-            counts.push(ALLOCATIONS.load(Ordering::Relaxed) - before);
+            counts.push(allocations() - before);
         }
         counts
     });
@@ -93,5 +76,5 @@ fn from_packet_to_pose_nothing_is_allocated_once_warm() {
     const WARM: usize = 85;
     let warm = &counts[WARM..counts.len() - 1];
     assert!(warm.len() > 25, "{} scans", counts.len());
-    assert_eq!(warm.iter().sum::<u64>(), 0, "{counts:?}");
+    assert_eq!(warm.iter().sum::<usize>(), 0, "{counts:?}");
 }

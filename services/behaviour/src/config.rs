@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::obstacles::SEEN_M;
+use crate::swept::LONGEST_STOP_S;
+
 /// Limits of the gate. A robot's own limits hold besides.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -156,6 +159,24 @@ impl SafetyConfig {
             if !(least..=most).contains(&value) {
                 return Err(ConfigError { key, value, wanted });
             }
+        }
+        self.check_stopping()
+    }
+
+    /// Refuses a robot that needs longer to stop, or more room, than the obstacle stop looks ahead.
+    fn check_stopping(&self) -> Result<(), ConfigError> {
+        let ahead = self.forward_m_per_s.max(self.backward_m_per_s);
+        let speed = ahead.hypot(self.sideways_m_per_s);
+        let brakes_s = (speed / self.braking_m_per_s2)
+            .max(self.turn_rad_per_s / self.turn_acceleration_rad_per_s2);
+        let way_m = speed * (self.reaction_s + 0.5 * speed / self.braking_m_per_s2);
+        let room_m = self.half_length_m.hypot(self.half_width_m) + self.margin_m + way_m;
+        if self.reaction_s + brakes_s > LONGEST_STOP_S || room_m > SEEN_M {
+            return Err(ConfigError {
+                key: "braking_m_per_s2",
+                value: self.braking_m_per_s2,
+                wanted: "harder brakes, or less speed or reaction time: it has to stand within 3.9 s and 4.9 m",
+            });
         }
         Ok(())
     }

@@ -16,8 +16,11 @@ use crate::config::SafetyConfig;
 pub const SECTORS: usize = 180;
 /// Distances that are told apart, metres.
 const BIN_M: f32 = 0.1;
-/// Farther away than this nothing stops the robot: it brakes within less than a metre.
+/// Farther away than these nothing is looked at: settings with which the robot needs more room to
+/// stop are refused ([`SafetyConfig::check`]).
 const BINS: usize = 50;
+/// How far away obstacles are seen, m: less a bin, whose near edge counts.
+pub(crate) const SEEN_M: f64 = (BINS - 1) as f64 * BIN_M as f64;
 /// Returns from about one place that make a thing.
 const SUPPORT: u16 = 3;
 
@@ -109,7 +112,7 @@ impl ObstacleFinder {
             // What lies across the border of two bins is one thing.
             let nearest = counts
                 .windows(2)
-                .position(|pair| pair[0] + pair[1] >= SUPPORT);
+                .position(|pair| pair[0].saturating_add(pair[1]) >= SUPPORT);
             if let Some(bin) = nearest {
                 let bin = if counts[bin] == 0 { bin + 1 } else { bin };
                 obstacles.add(place(sector, bin));

@@ -14,8 +14,11 @@ const SHARES: [f64; 6] = [1.0, 0.8, 0.6, 0.4, 0.2, 0.0];
 
 /// Between two looked-at moments, s: 4 cm at 0.8 m/s.
 const STEP_S: f64 = 0.05;
-/// The longest way that is looked at, in steps: 4 s, which is 1.6 m/s with the slowest brakes.
+/// The longest way that is looked at, in steps: 4 s. Settings with which the robot needs longer to
+/// stop are refused ([`SafetyConfig::check`]); a way that is not seen to its end is not free.
 const STEPS: usize = 80;
+/// The same in seconds, for whoever checks settings: less a step of rounding.
+pub(crate) const LONGEST_STOP_S: f64 = (STEPS - 1) as f64 * STEP_S;
 
 /// A thing that is too near already may not come nearer by more than this, m: rounding.
 const ROUNDING_M: f64 = 1e-6;
@@ -45,7 +48,7 @@ fn is_free(velocity: &BodyVelocity, obstacles: &Obstacles, config: &SafetyConfig
     let mut time_s = 0.0;
     for _ in 0..STEPS {
         if time_s > config.reaction_s + brakes_s {
-            break;
+            return true;
         }
         let speed = match time_s < config.reaction_s {
             true => 1.0,
@@ -65,7 +68,7 @@ fn is_free(velocity: &BodyVelocity, obstacles: &Obstacles, config: &SafetyConfig
             return false;
         }
     }
-    true
+    false
 }
 
 /// Whether the rectangle at `pose` is too near to a thing: nearer than the margin, or than it is

@@ -489,6 +489,18 @@ fn limits_that_cannot_work_are_refused_by_name() {
             turn_rad_per_s: 40.0,
             ..SafetyConfig::default()
         },
+        // Eight seconds from 0.8 m/s: longer than is looked ahead.
+        SafetyConfig {
+            braking_m_per_s2: 0.1,
+            ..SafetyConfig::default()
+        },
+        // Stands within a second, but farther away than obstacles are seen.
+        SafetyConfig {
+            forward_m_per_s: 5.0,
+            braking_m_per_s2: 5.0,
+            reaction_s: 0.5,
+            ..SafetyConfig::default()
+        },
     ];
     let keys = wrong.map(|config| config.check().unwrap_err().key);
     assert_eq!(
@@ -497,7 +509,9 @@ fn limits_that_cannot_work_are_refused_by_name() {
             "forward_m_per_s",
             "lidar_stale_s",
             "half_length_m",
-            "turn_rad_per_s"
+            "turn_rad_per_s",
+            "braking_m_per_s2",
+            "braking_m_per_s2"
         ]
     );
 }

@@ -1,41 +1,21 @@
 //! Once warm, the filters allocate nothing.
-#![allow(
-    unsafe_code,
-    reason = "a global allocator that counts can't be written without"
-)]
 
 mod scene;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::alloc::System;
 
 use hachi_cloud::{FilterConfig, Filters, IntensityMode, ScanFrames};
 use scene::{Finish, Scene, standing};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call goes to the system's allocator unchanged; the counter is atomic.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promise about `layout` is passed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(memory, layout) }
-    }
-    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: as above.
-        unsafe { System.realloc(memory, layout, size) }
-    }
-}
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+/// Allocations of the whole process so far, those among them that made a block larger too.
+fn allocations() -> usize {
+    let stats = ALLOCATOR.stats();
+    stats.allocations + stats.reallocations
+}
 
 /// One test alone in its file: another thread's allocations would count.
 #[test]
@@ -76,10 +56,10 @@ fn warm_filters_allocate_nothing_in_any_mode() {
             let frames = ScanFrames::default();
             filters.step(&first.points, &frames, &mut kept);
             filters.step(&second.points, &frames, &mut kept);
-            let before = ALLOCATIONS.load(Ordering::Relaxed);
+            let before = allocations();
             filters.step(&second.points, &frames, &mut kept);
             filters.step(&first.points, &frames, &mut kept);
-            let allocations = ALLOCATIONS.load(Ordering::Relaxed) - before;
+            let allocations = allocations() - before;
             assert_eq!(allocations, 0, "{intensity:?}, adaptive {adaptive_reject}");
         }
     }

@@ -21,8 +21,8 @@ const LOOK_AT: usize = 2_500;
 /// Largest UDP payload.
 const MAX_PAYLOAD: usize = 65_536;
 
-/// A ground that was felt longer ago than this is not used, ns.
-const GROUND_STALE_NS: i64 = 300_000_000;
+/// A ground that legs felt longer ago than this is not used, ns.
+pub const GROUND_STALE_NS: i64 = 300_000_000;
 
 /// The legs of one robot in one capture.
 pub struct LegSamples {

@@ -228,7 +228,7 @@ impl Mapping {
     pub fn report(&self) -> Report {
         let mut report = self.record.report(&self.record.trajectory);
         if let Some(slam) = &self.slam {
-            report.loops = slam.loop_counts().into();
+            slam.fill(&mut report);
         }
         self.times.fill(&mut report);
         report
@@ -247,8 +247,8 @@ pub enum Ended {
     Finished,
     /// Because somebody asked for it.
     Interrupted,
-    /// Because the recording can't be read further.
-    Unreadable(Failure),
+    /// Because the recording can't be read further, or what was to be recorded could not be kept.
+    Failed(Failure),
 }
 
 /// Feeds a whole recording through the pipeline. What was done until an end of any kind stays.
@@ -270,7 +270,7 @@ pub fn run(
         let header = match source.next_scan(&mut points) {
             Ok(Some(header)) => header,
             Ok(None) => return Ended::Finished,
-            Err(failure) => return Ended::Unreadable(failure),
+            Err(failure) => return Ended::Failed(failure),
         };
         let read: Duration = start.elapsed();
         if header.end <= last_end {
@@ -295,6 +295,6 @@ pub fn state_of(ended: &Ended) -> RunState {
     match ended {
         Ended::Finished => RunState::Finished,
         Ended::Interrupted => RunState::Interrupted,
-        Ended::Unreadable(_) => RunState::InputFailed,
+        Ended::Failed(_) => RunState::InputFailed,
     }
 }

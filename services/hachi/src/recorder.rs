@@ -3,7 +3,8 @@
 //! In: the LiDAR's packets and the robot's body, with their stamps. Out: one file; its topics are in
 //! `schemas`, their bytes in `cdr`. Packets are kept as they came, so that `hachi replay` of the
 //! file is what a replay of the wire would have been. What is in a finished chunk (a quarter of a
-//! megabyte, a fifth of a second) survives a power cut.
+//! megabyte, a fifth of a second) is there after the program is killed, but for the last few
+//! kilobytes; nothing is forced to the disk before the end.
 
 mod cdr;
 mod schemas;

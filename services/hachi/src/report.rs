@@ -44,6 +44,9 @@ pub struct Report {
     pub total_per_scan_ms: LatencySummary,
     /// Loops.
     pub loops: LoopCounts,
+    /// Submaps that were given up because the map could not be kept for long; absent if none were.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub submaps_given_up: u64,
     /// What was left out, by reason.
     pub dropped: BTreeMap<String, u64>,
     /// How far the poses can be trusted.
@@ -54,6 +57,11 @@ pub struct Report {
     pub peak_rss_mb: Option<f64>,
     /// How it ended.
     pub state: RunState,
+}
+
+/// For serde.
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// How far the scans' poses can be trusted: how many of each condition.
@@ -244,6 +252,11 @@ mod tests {
         }
         assert_eq!(json["dropped"], serde_json::json!({ "range": 5 }));
         assert_eq!(json["state"], "finished");
+
+        assert!(json.get("submaps_given_up").is_none());
+        report.submaps_given_up = 44;
+        let json = serde_json::to_value(&report).unwrap();
+        assert_eq!(json["submaps_given_up"], 44);
     }
 
     #[cfg(target_os = "linux")]

@@ -14,6 +14,7 @@ use tracing::{info, warn};
 
 use crate::exit::Failure;
 use crate::map_builder::MapBuilder;
+use crate::report::Report;
 
 /// The stage.
 #[derive(Debug)]
@@ -27,6 +28,9 @@ pub struct SlamStage {
     points: Vec<Point>,
     events: SlamEvents,
     store_fails: bool,
+    /// Submaps that were given up so far, and whether that was said since the store last worked.
+    given_up: u64,
+    given_up_said: bool,
     keeps_path: bool,
 }
 
@@ -41,6 +45,8 @@ impl SlamStage {
             points: Vec::new(),
             events: SlamEvents::default(),
             store_fails: false,
+            given_up: 0,
+            given_up_said: false,
             keeps_path: true,
         }
     }
@@ -139,7 +145,17 @@ impl SlamStage {
             self.store_fails = true;
         } else if !self.events.fixed.is_empty() {
             self.store_fails = false;
+            self.given_up_said = false;
         }
+        let given_up = self.slam.map().submaps_given_up();
+        if given_up > self.given_up && !self.given_up_said {
+            warn!(
+                "the map could not be kept for so long that its oldest waiting submaps are given up: \
+                 make room on the disk"
+            );
+            self.given_up_said = true;
+        }
+        self.given_up = given_up;
         for error in &self.events.graph_errors {
             warn!(%error, "the graph does not take a node or a loop");
         }
@@ -190,6 +206,12 @@ impl SlamStage {
     /// How many candidates there were, and what became of them.
     pub fn loop_counts(&self) -> LoopCounts {
         LoopCounts::of(self.slam.map().ledger())
+    }
+
+    /// Puts the loops, and what of the map was lost, into a report.
+    pub fn fill(&self, report: &mut Report) {
+        report.loops = self.loop_counts().into();
+        report.submaps_given_up = self.slam.map().submaps_given_up();
     }
 
     /// Where loops lead from and to, on the map.

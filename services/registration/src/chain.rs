@@ -271,9 +271,9 @@ impl ChainSystem {
     fn add_smoothness(&mut self, chain: &Chain, agility: &Agility) {
         for i in 1..chain.len - 1 {
             let unusual = match i {
-                // At both ends of a time without scans.
-                1 | 2 if chain.leads => agility.between_scans,
                 1 => agility.between_scans,
+                // At both ends of a time without scans.
+                2 if chain.leads => agility.between_scans,
                 _ => 1.0,
             };
             let (before, after) = (chain.gaps_s[i - 1], chain.gaps_s[i]);

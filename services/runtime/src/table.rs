@@ -142,12 +142,11 @@ impl Task {
         self.work.run(begun)
     }
 
-    /// Accounts for a run that took so long until `ended`. `judged_ns` decides whether it took too
+    /// Accounts for a run that took so long. `judged_ns` decides whether it took too
     /// long: the same, but in virtual time.
-    pub fn account(&mut self, took_ns: i64, judged_ns: i64, ended: Stamp) {
+    pub fn account(&mut self, took_ns: i64, judged_ns: i64) {
         let record = &self.record;
         record.execution.record_signed_ns(took_ns);
-        record.ended_ns.store(ended.as_nanos(), Ordering::Relaxed);
         let overran = judged_ns > self.spec.budget_ns;
         if overran {
             record.overruns.fetch_add(1, Ordering::Relaxed);

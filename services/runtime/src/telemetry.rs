@@ -1,9 +1,8 @@
 //! What tasks did: counts and times, written by the tasks, read by whoever asks.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, AtomicUsize, Ordering};
 
-use hachi_hal::Stamp;
 use serde::{Deserialize, Serialize};
 
 use crate::histogram::{Histogram, Summary};
@@ -22,7 +21,6 @@ pub struct TaskRecord {
     pub(crate) skipped: AtomicU64,
     pub(crate) level: AtomicUsize,
     pub(crate) scheduling: AtomicU8,
-    pub(crate) ended_ns: AtomicI64,
 }
 
 impl TaskRecord {
@@ -45,11 +43,6 @@ impl TaskRecord {
     pub(crate) fn skip(&self, missed: i64) {
         let missed = u64::try_from(missed).unwrap_or(0);
         self.skipped.fetch_add(missed, Ordering::Relaxed);
-    }
-
-    /// When its last run ended; the clock's zero before the first.
-    pub fn last_end(&self) -> Stamp {
-        Stamp::from_nanos(self.ended_ns.load(Ordering::Relaxed))
     }
 }
 

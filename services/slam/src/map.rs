@@ -24,6 +24,7 @@ use crate::saved::{SavedMap, SavedMapError};
 use crate::store::{StoreError, SubmapStore};
 use crate::submap::Submap;
 
+pub(crate) use keeping::MOST_PENDING;
 use keeping::Pending;
 
 /// Nodes that hang together.

@@ -11,10 +11,13 @@ use crate::closing::Closing;
 use crate::config::SlamConfig;
 use crate::graph::GraphError;
 use crate::ledger::{Refusal, Verdict};
-use crate::map::Map;
+use crate::map::{MOST_PENDING, Map};
 use crate::node::{NodeId, PieceId};
 use crate::recognition::Recognition;
 use crate::store::{StoreError, SubmapStore};
+
+/// Copied nodes are handed to the store at least this often: only so many submaps may wait for it.
+const COMMIT_EVERY: usize = MOST_PENDING / 2;
 
 /// Why two maps can't be merged.
 #[derive(Debug, thiserror::Error)]
@@ -160,7 +163,7 @@ fn copy(from: &mut Map, to: &mut Map) -> Result<std::ops::Range<u32>, MergeError
     let (sessions, nodes) = (to.sessions(), from.nodes().to_vec());
     let edges = from.edges().to_vec();
     let mut pieces: Vec<Option<PieceId>> = vec![None; from.pieces().len()];
-    for node in &nodes {
+    for (count, node) in nodes.iter().enumerate() {
         let slot = &mut pieces[node.piece.0 as usize];
         let piece = *slot.get_or_insert_with(|| to.begin_piece());
         let submap = from.submap(node.id)?;
@@ -170,6 +173,9 @@ fn copy(from: &mut Map, to: &mut Map) -> Result<std::ops::Range<u32>, MergeError
         copied.piece = piece;
         to.places.describe(&submap, &node.ground);
         to.add_bare(copied, Arc::clone(&submap));
+        if (count + 1).is_multiple_of(COMMIT_EVERY) {
+            to.commit(false)?;
+        }
     }
     to.hold(first, &edges, from.ledger())?;
     to.commit(true)?;

@@ -15,7 +15,7 @@ pub struct Surfaces {
     points: Vec<SurfacePoint>,
     /// The places that they were seen from, common frame; and for each surface its one.
     eyes: Vec<[f32; 3]>,
-    eye_of: Vec<u16>,
+    eye_of: Vec<u32>,
     positions: Vec<[f32; 3]>,
     tree: KdTree,
     /// The coarsest cubes among the submaps, metres.
@@ -57,9 +57,8 @@ impl Surfaces {
                     position,
                     normal: (rotation * nalgebra::Vector3::from(p.normal)).into(),
                 });
-                // Some tens of submaps with a few tens of places each.
                 let eye = first_eye + usize::from(p.viewpoint);
-                self.eye_of.push(u16::try_from(eye).unwrap_or(u16::MAX));
+                self.eye_of.push(u32::try_from(eye).unwrap_or(u32::MAX));
             }
         }
     }
@@ -83,7 +82,7 @@ impl Surfaces {
         let picked = count.min(total);
         (0..picked).filter_map(move |i| {
             let index = i * total / picked;
-            let eye = self.eyes.get(usize::from(self.eye_of[index]))?;
+            let eye = self.eyes.get(self.eye_of[index] as usize)?;
             Some([*eye, self.points[index].position])
         })
     }

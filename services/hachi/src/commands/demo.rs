@@ -111,7 +111,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     }
     match walked.ended {
         Ended::Finished => Ok(()),
-        Ended::Unreadable(failure) => Err(failure),
+        Ended::Failed(failure) => Err(failure),
         Ended::Interrupted => Err(interrupted(report.report.scans)),
     }
 }

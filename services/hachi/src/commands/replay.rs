@@ -162,7 +162,7 @@ pub fn first_failure(
 /// The exit of a run: nothing read at all is a failure, so is a stop half-way.
 fn conclude(ended: Ended, report: &Report, input: &Path) -> Result<(), Failure> {
     match ended {
-        Ended::Unreadable(failure) => Err(failure),
+        Ended::Failed(failure) => Err(failure),
         Ended::Interrupted => Err(Failure::Interrupted(format!(
             "{} scans were processed and written",
             report.scans

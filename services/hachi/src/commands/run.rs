@@ -25,7 +25,7 @@ use tracing::{error, info, warn};
 use super::replay::slam;
 use super::simulate::platform_of;
 use crate::cli::service::{RecordArguments, RunArguments};
-use crate::config::Settings;
+use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::recorder::Recorder;
@@ -145,7 +145,20 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
         .unwrap_or_else(std::sync::PoisonError::into_inner);
     stage.finish();
     info!(nodes = stage.slam().map().nodes().len(), "stopped");
-    outcome.map_err(|error| Failure::new(error, "see the log; systemd starts the service again"))
+    outcome
+        .map_err(|error| Failure::new(error, "see the log; systemd starts the service again"))?;
+    match signs.recording_fails.load(Ordering::Relaxed) {
+        true => Err(recording_failed()),
+        false => Ok(()),
+    }
+}
+
+/// What was to be kept is not, or not to its end.
+pub(super) fn recording_failed() -> Failure {
+    Failure::new(
+        "the recording is not whole",
+        "see the log (--log error); free some space or choose another place",
+    )
 }
 
 /// The settings, once they can be worked with.
@@ -185,6 +198,12 @@ fn settings(path: &Path) -> Result<(Settings, Platform), Failure> {
             "set robot.platform to b1 or go1",
         ));
     };
+    if settings.motion == MotionInput::Imu {
+        return Err(Failure::new(
+            format_args!("{}: motion = \"imu\" is for recordings", path.display()),
+            "set motion to \"odometry\" (the legs) or \"none\"",
+        ));
+    }
     let platform = platform_of(name)?;
     Ok((settings, platform))
 }

@@ -43,6 +43,8 @@ pub struct BaseCommandTask<L> {
     pub said: Causes,
     /// Whether the last step failed at the base.
     pub failing: bool,
+    /// Whether the link to the robot failed when it was last listened to.
+    pub deaf: bool,
 }
 
 impl<L: RobotLink + Send> Work for BaseCommandTask<L> {
@@ -78,7 +80,9 @@ impl<L: RobotLink> BaseCommandTask<L> {
     /// Takes in what the robot sent.
     fn hear(&mut self, now: Stamp) {
         for _ in 0..MOST_AT_ONCE {
-            match self.base.listen(now) {
+            let heard = self.base.listen(now);
+            let was_deaf = std::mem::replace(&mut self.deaf, heard.is_err());
+            match heard {
                 Ok(Some(report)) => {
                     self.sight.robot = Some(report.stamp);
                     self.signs.robot.set(report.stamp);
@@ -93,10 +97,9 @@ impl<L: RobotLink> BaseCommandTask<L> {
                 }
                 Ok(None) => return,
                 Err(error) => {
-                    if !self.failing {
+                    if !was_deaf {
                         warn!(%error, "the link to the robot fails");
                     }
-                    self.failing = true;
                     return;
                 }
             }

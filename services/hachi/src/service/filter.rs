@@ -9,12 +9,10 @@ use hachi_runtime::{Progress, Receiver, Sender, Work};
 
 use super::crew::Crew;
 use super::messages::{Belt, BeltEnd, Kept, Scan};
+use crate::leg_samples::GROUND_STALE_NS;
 
 /// What the task leaves out, step by step.
 pub const LADDER: &[&str] = &["every second point", "every second of the rest"];
-
-/// A ground that legs felt longer ago than this is not used, ns.
-const GROUND_STALE_NS: i64 = 300_000_000;
 
 /// The task.
 pub struct Filter {

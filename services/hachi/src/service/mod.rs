@@ -8,7 +8,7 @@
 //! | module | task | released by |
 //! |---|---|---|
 //! | [`base`] | `base command`: hears the robot, asks the gate, tells the robot | 5 ms |
-//! | [`lidar`] | `lidar receive`: packets to scans | 2 ms |
+//! | [`lidar`] | `lidar receive`: packets to scans | 4 ms |
 //! | [`legs`] | `legs`: footprint and leg odometry | a state of the robot |
 //! | [`filter`] | `filter`: obstacles first, then which points are kept | a scan |
 //! | [`odometry`] | `odometry`: where the scan was | a filtered scan |
@@ -34,6 +34,7 @@ pub mod record;
 pub mod rows;
 pub mod settings;
 pub mod signs;
+pub mod simulated;
 pub mod simulator;
 pub mod slam;
 pub mod supervisor;

@@ -99,7 +99,6 @@ impl OdometryTask {
         for out in &self.places {
             let _ = out.send(place);
         }
-        self.signs.place.set(estimate.stamp);
         let now = self.clock.now();
         for (latency, from) in self.latencies.iter().zip([header.start, header.end]) {
             latency.record_signed_ns(now.nanos_since(from));

@@ -129,6 +129,7 @@ impl Drop for RecorderTask {
         self.run(Stamp::default());
         if let Some(Err(error)) = self.recorder.as_mut().map(Recorder::finish) {
             error!(%error, "the recording has no index");
+            self.signs.recording_fails.store(true, Ordering::Relaxed);
         }
     }
 }

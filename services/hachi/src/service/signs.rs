@@ -67,8 +67,6 @@ pub struct Signs {
     pub scan: Mark,
     /// The robot's last new state.
     pub robot: Mark,
-    /// The last pose.
-    pub place: Mark,
     /// The supervisor's last round: the event loop.
     pub event_loop: Mark,
     /// How far the place is to be trusted.
@@ -84,7 +82,7 @@ pub struct Signs {
     pub recording_fails: AtomicBool,
     /// Commands that were cut to a limit.
     pub limited: AtomicU64,
-    /// Charge of the battery, per cent; 255 while it is unknown.
+    /// Charge of the battery, per cent; 0 while it is unknown.
     pub battery_percent: AtomicU32,
 }
 

@@ -60,7 +60,10 @@ impl Work for SlamTask {
                 .store(stage.store_fails(), Ordering::Relaxed);
             let _ = self.corrections.send(Correction {
                 map_from_odom: place.map_from_odom,
-                trusted: !matches!(place.condition, SlamCondition::Lost(_)),
+                trusted: matches!(
+                    place.condition,
+                    SlamCondition::Ok | SlamCondition::Degraded(_)
+                ),
             });
         }
         if let Some(begun) = placed.begun {

@@ -33,6 +33,8 @@ pub struct Status {
     pub nodes: u64,
     /// Loops that were closed.
     pub loops: u64,
+    /// Commands that were cut to a limit.
+    pub limited: u64,
     /// Charge of the battery, per cent, where it is known.
     pub battery_percent: Option<u32>,
     /// Every task.
@@ -52,6 +54,7 @@ impl Status {
             standing: signs.causes().iter().map(|c| c.line().to_owned()).collect(),
             nodes: signs.nodes.load(Ordering::Relaxed),
             loops: signs.loops.load(Ordering::Relaxed),
+            limited: signs.limited.load(Ordering::Relaxed),
             battery_percent: (1..=100).contains(&battery).then_some(battery),
             tasks: telemetry.rows(),
             latencies: telemetry.latency_rows(),

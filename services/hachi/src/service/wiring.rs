@@ -123,6 +123,8 @@ where
     let mut table = TaskTable::new(clock);
     let signs = SharedSigns::default();
     let record = Arc::new(Mutex::new(RunRecord::new(running.has_an_end())));
+    // On a map that was made before, nobody knows the place until SLAM says so.
+    let begins_the_map = slam.map().nodes().is_empty();
     let stage = SlamStage::new(slam, base_from_lidar);
     let stage = match running.has_an_end() {
         true => stage,
@@ -150,7 +152,6 @@ where
     let records = recorder.is_some();
     let (wishes, wishes_end) = bounded("wishes", 4, WhenFull::DropOldest, &nobody);
 
-    let gauges = vec![wishes_end.gauge(), gate_places.gauge(), around_end.gauge()];
     let gate = SafetyGate::new(settings.safety);
     let base_command = BaseCommandTask {
         base: GuardedBase::new(gate, UnitreeBody(devices.client)),
@@ -166,10 +167,12 @@ where
         signs: Arc::clone(&signs),
         said: Causes::default(),
         failing: false,
+        deaf: false,
     };
     let bell = table.bell();
     let spec = row(settings, rows::BASE_COMMAND);
-    table.add(spec, bell, gauges, Box::new(base_command));
+    // Of states only the newest counts: that the others go is no loss, and is not told.
+    table.add(spec, bell, vec![], Box::new(base_command));
 
     let packets = Tap {
         source: devices.packets,
@@ -204,7 +207,6 @@ where
     );
 
     let spec = row(settings, rows::FILTER);
-    // Of states only the newest counts: that the others go is no loss, and is not told.
     let gauges = vec![scans_end.full.gauge()];
     let standing = Translation3::new(0.0, 0.0, devices.platform.standing_m);
     let filter = Filter {
@@ -238,7 +240,7 @@ where
         corrections: corrections_end,
         correction: Correction {
             map_from_odom: Pose::identity(),
-            trusted: true,
+            trusted: begins_the_map,
         },
         out: placed,
         places: [to_gate, to_behaviour],

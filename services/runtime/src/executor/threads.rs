@@ -187,7 +187,7 @@ fn by_period(task: &mut Task, period_ns: i64, shared: &Shared) {
         let Some(begun) = wait_until(release, shared) else {
             return;
         };
-        run_once(task, release, begun, shared);
+        run_once(task, release, begun);
         release = release + period_ns;
         let missed = shared.clock.now().nanos_since(release) / period_ns;
         if missed > 0 {
@@ -219,7 +219,7 @@ fn by_input(task: &mut Task, shared: &Shared) {
         };
         loop {
             let begun = shared.clock.now();
-            let progress = run_once(task, released, begun, shared);
+            let progress = run_once(task, released, begun);
             if progress == Progress::Done || shared.stop.load(Ordering::Acquire) {
                 break;
             }
@@ -228,10 +228,10 @@ fn by_input(task: &mut Task, shared: &Shared) {
     }
 }
 
-fn run_once(task: &mut Task, released: Stamp, begun: Stamp, shared: &Shared) -> Progress {
+fn run_once(task: &mut Task, released: Stamp, begun: Stamp) -> Progress {
     let started = Instant::now();
     let progress = task.run(released, begun);
     let took_ns = i64::try_from(started.elapsed().as_nanos()).unwrap_or(i64::MAX);
-    task.account(took_ns, took_ns, shared.clock.now());
+    task.account(took_ns, took_ns);
     progress
 }

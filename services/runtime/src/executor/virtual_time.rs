@@ -132,7 +132,7 @@ impl VirtualTime {
             None => 0,
         };
         timed.busy_until = at + cost_ns;
-        timed.task.account(took_ns, cost_ns, timed.busy_until);
+        timed.task.account(took_ns, cost_ns);
         if progress == Progress::More {
             timed.again = Some(timed.busy_until);
         }

@@ -21,7 +21,7 @@ const MOVED_M: f64 = 1e-4;
 const MOVED_RAD: f64 = 1e-5;
 
 /// Submaps that wait for the store, at most: 15 MB, some minutes of walking.
-const MOST_PENDING: usize = 256;
+pub(crate) const MOST_PENDING: usize = 256;
 
 /// Old poses are written again after so many new nodes; from the edges they can be had at any time.
 const POSES_EVERY: usize = 50;

@@ -49,23 +49,9 @@ impl Map {
         &mut self,
         loops: &[(LoopId, Matrix6<f64>)],
     ) -> Result<Vec<LedgerEntry>, GraphError> {
-        let mut edges = Vec::new();
-        let mut piece = None;
-        for (loop_id, information) in loops {
-            let Some(entry) = self.ledger.get(loop_id.0 as usize) else {
-                continue;
-            };
-            piece = self.node(entry.node).map(|n| n.piece);
-            edges.push(Edge {
-                id: self.next_edge + edges.len() as u32,
-                kind: EdgeKind::Loop(*loop_id),
-                first: entry.candidate,
-                second: entry.node,
-                first_from_second: entry.candidate_from_node,
-                information: *information,
-            });
-        }
-        let Some(piece) = piece else {
+        let edges = self.loop_edges(loops);
+        let last = edges.last().and_then(|edge| self.node(edge.second));
+        let Some(piece) = last.map(|node| node.piece) else {
             return Ok(Vec::new());
         };
         if let Some(graph) = &mut self.pieces[piece.0 as usize].graph {
@@ -76,14 +62,7 @@ impl Map {
         self.edges.extend_from_slice(&edges);
         self.pending.edges.extend_from_slice(&edges);
         self.take_poses(piece);
-        let mut decided = Vec::new();
-        for (loop_id, _) in loops {
-            if let Some(entry) = self.ledger.get_mut(loop_id.0 as usize) {
-                entry.verdict = Verdict::Accepted;
-                decided.push(*entry);
-                self.pending.ledger.push(*loop_id);
-            }
-        }
+        let mut decided = self.accept(loops);
         decided.extend(self.weigh_loops(piece));
         Ok(decided)
     }
@@ -123,18 +102,7 @@ impl Map {
             .copied()
             .collect();
         let old = edges.len();
-        for (loop_id, information) in loops {
-            if let Some(entry) = self.ledger.get(loop_id.0 as usize) {
-                edges.push(Edge {
-                    id: self.next_edge + (edges.len() - old) as u32,
-                    kind: EdgeKind::Loop(*loop_id),
-                    first: entry.candidate,
-                    second: entry.node,
-                    first_from_second: entry.candidate_from_node,
-                    information: *information,
-                });
-            }
-        }
+        edges.extend(self.loop_edges(loops));
         let Some(graph) = &mut self.pieces[target.0 as usize].graph else {
             return Ok(Vec::new());
         };
@@ -153,6 +121,30 @@ impl Map {
         self.pending.edges.extend_from_slice(&edges[old..]);
         self.pending.joined.push((piece, target));
         self.take_poses(target);
+        Ok(self.accept(loops))
+    }
+
+    /// The edges that loops are, numbered on.
+    fn loop_edges(&self, loops: &[(LoopId, Matrix6<f64>)]) -> Vec<Edge> {
+        let known = loops.iter().filter_map(|(loop_id, information)| {
+            let entry = self.ledger.get(loop_id.0 as usize)?;
+            Some((*loop_id, entry, *information))
+        });
+        known
+            .zip(self.next_edge..)
+            .map(|((loop_id, entry, information), id)| Edge {
+                id,
+                kind: EdgeKind::Loop(loop_id),
+                first: entry.candidate,
+                second: entry.node,
+                first_from_second: entry.candidate_from_node,
+                information,
+            })
+            .collect()
+    }
+
+    /// The entries of loops that the graph took: accepted from now on.
+    fn accept(&mut self, loops: &[(LoopId, Matrix6<f64>)]) -> Vec<LedgerEntry> {
         let mut decided = Vec::new();
         for (loop_id, _) in loops {
             if let Some(entry) = self.ledger.get_mut(loop_id.0 as usize) {
@@ -161,7 +153,7 @@ impl Map {
                 self.pending.ledger.push(*loop_id);
             }
         }
-        Ok(decided)
+        decided
     }
 
     /// Takes a loop out by hand. `None` if there is no such loop in the map.

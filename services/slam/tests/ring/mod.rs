@@ -200,8 +200,7 @@ impl Walker {
         }
     }
 
-    /// How far the map has its nodes of the first piece from the truth, at worst, metres. Nodes are
-    /// found by their time.
+    /// How far an estimate is from the truth: metres, radians.
     pub fn off_m(&self, estimate: &SlamEstimate) -> (f64, f64) {
         let truth = truth(0.5).inv_mul(&truth(self.way_m));
         let off = truth.inv_mul(&estimate.map_from_base);

@@ -5,20 +5,19 @@
 //! sockets; the tasks are those of `hachi run`. The same arguments give the same bytes.
 
 use std::io::IsTerminal;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use hachi_bridge::message::Sensor;
 use hachi_runtime::executor::virtual_time::VirtualTime;
-use hachi_runtime::{Health, Overrun, TaskClock, TaskSpec, Trigger, VirtualClock};
-use hachi_slam::Slam;
+use hachi_runtime::{Health, VirtualClock};
 use hachi_trajectory::Trajectory;
-use hachi_unitree::device::{HighClient, MemoryLink, SimulatedRobotConfig, SimulatedService};
-use hachi_world::{LiveLidar, SensorKind, SimulationConfig};
+use hachi_world::SimulationConfig;
 
 use super::Walked;
 use crate::cli::mapping::DemoArguments;
 use crate::commands::replay::slam;
+use crate::commands::run::recording_failed;
 use crate::commands::simulate::platform_of;
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
@@ -27,27 +26,12 @@ use crate::map_builder::MapBuilder;
 use crate::mapping::Ended;
 use crate::recorder::Recorder;
 use crate::results::Results;
-use crate::service::settings::Platform;
 use crate::service::signs::SharedSigns;
-use crate::service::simulator::{MemoryPackets, SimulatorTask, Truth, WalkingBody, route};
+use crate::service::simulated::{connect, sensor_of};
+use crate::service::simulator::{Truth, route};
 use crate::service::web::Status;
-use crate::service::wiring::{Devices, Running, Service, assemble};
+use crate::service::wiring::{Running, Service};
 use crate::{output, progress, task_table};
-
-/// The other side of the wires goes first: what it sends at a moment is there at that moment.
-const SIMULATOR: TaskSpec = TaskSpec {
-    name: "simulator",
-    trigger: Trigger::Period {
-        period_ns: 1_000_000,
-    },
-    budget_ns: i64::MAX,
-    priority: 99,
-    core: None,
-    parallel: true,
-    overrun: Overrun::Skip,
-    hard: false,
-    ladder: &[],
-};
 
 /// Virtual time that passes between two looks at Ctrl-C and the screen, ns.
 const SLICE_NS: i64 = 100_000_000;
@@ -88,7 +72,15 @@ pub fn walk(
         Some(path) => Some(Recorder::create(path, sensor_of(&world))?),
         None => None,
     };
-    let (service, truth) = connect(&settings, &platform, &world, &clock, (slam, recorder))?;
+    let running = Running::VirtualTime;
+    let (service, truth) = connect(
+        &settings,
+        &platform,
+        &world,
+        &clock,
+        running,
+        (slam, recorder),
+    )?;
     let Service {
         table,
         signs,
@@ -120,7 +112,7 @@ pub fn walk(
     let mut map = MapBuilder::new(settings.map.voxel_m, results.folder());
     stage.build_map(&mut map)?;
     let mut report = lock(&record).report(&trajectory);
-    report.loops = stage.loop_counts().into();
+    stage.fill(&mut report);
     report.total_per_scan_ms = scan_times.summary().into();
     for (name, stage) in [
         ("lidar receive", "read"),
@@ -135,6 +127,11 @@ pub fn walk(
             report.stages.insert(stage.to_owned(), times);
         }
     }
+    // The recorder's last lines are written when its task goes.
+    drop(run);
+    if screen.signs.recording_fails.load(Ordering::Relaxed) {
+        ended = Ended::Failed(recording_failed());
+    }
     let walked = Walked {
         truth: true_path(&truth, &trajectory),
         odometry: stage.odometry(),
@@ -147,56 +144,6 @@ pub fn walk(
         robot: Some(platform.robot.name()),
     };
     Ok(walked)
-}
-
-fn sensor_of(world: &SimulationConfig) -> Sensor {
-    match world.sensor {
-        SensorKind::Helios16P => Sensor::Robosense,
-        _ => Sensor::Velodyne,
-    }
-}
-
-/// The service on one end of the wires, the simulated robot on the other.
-fn connect(
-    settings: &Settings,
-    platform: &Platform,
-    world: &SimulationConfig,
-    clock: &VirtualClock,
-    (slam, recorder): (Slam, Option<Recorder>),
-) -> Result<(Service, Truth), Failure> {
-    let link = MemoryLink::new(clock.clone());
-    let packets = MemoryPackets::default();
-    let truth = Truth::default();
-    let robot = platform.robot;
-    let client = HighClient::over(robot, platform.client(&settings.robot), link.clone())
-        .map_err(|error| Failure::new(error, "please report this"))?;
-    let devices = Devices {
-        platform: *platform,
-        client,
-        packets: packets.clone(),
-        sensor: sensor_of(world),
-    };
-    let tasks = TaskClock::new(clock.clone());
-    let mut service = assemble(
-        settings,
-        devices,
-        slam,
-        tasks,
-        Running::VirtualTime,
-        recorder,
-    )?;
-    let body = WalkingBody::standing(platform, world);
-    let config = SimulatedRobotConfig::for_robot(robot);
-    let simulator = SimulatorTask {
-        robot: SimulatedService::new(&robot.layout, body, config),
-        link,
-        lidar: LiveLidar::new(world.clone()),
-        packets,
-        truth: truth.clone(),
-    };
-    let table = &mut service.table;
-    table.add(SIMULATOR, table.bell(), vec![], Box::new(simulator));
-    Ok((service, truth))
 }
 
 /// Where the robot truly was at the trajectory's times, in its frame: the base at the first scan.

@@ -1,8 +1,7 @@
 //! A simulated robot that follows a fixed walk: the pipeline alone, without a service.
 
-use hachi_bridge::message::Sensor;
 use hachi_trajectory::Trajectory;
-use hachi_world::{SensorKind, SimulatedLidar, Simulation, SimulationConfig};
+use hachi_world::{SimulatedLidar, Simulation, SimulationConfig};
 
 use super::{SCANS_PER_SECOND, Walked};
 use crate::cli::mapping::{DemoArguments, StageArgument};
@@ -15,6 +14,7 @@ use crate::motion_samples::MotionSamples;
 use crate::progress;
 use crate::recording::from_packets;
 use crate::results::Results;
+use crate::service::simulated::sensor_of;
 use crate::slam_stage::{LEDGER_HEADING, SlamStage};
 
 /// Walks the robot along its path.
@@ -33,10 +33,7 @@ pub fn walk(
     if let Some(filter) = arguments.filter {
         filter.apply(&mut config.filter);
     }
-    let driver = match arguments.sensor {
-        SensorKind::Helios16P => Sensor::Robosense,
-        _ => Sensor::Velodyne,
-    };
+    let driver = sensor_of(&world);
     let lidar = SimulatedLidar::new(Simulation::new(world.clone()));
     let mut source = from_packets(driver, lidar, |_| Vec::new());
     let slam = match arguments.stage {

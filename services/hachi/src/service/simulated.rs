@@ -1,0 +1,81 @@
+//! The whole service and a simulated robot in one program, on one clock.
+//!
+//! In: settings, a world. Out: a table of the service's tasks and of the robot's, joined by wires in
+//! memory. Elsewhere: the robot itself ([`super::simulator`]), who runs the table
+//! (`hachi_runtime::executor`).
+
+use hachi_bridge::message::Sensor;
+use hachi_runtime::{Overrun, TaskClock, TaskSpec, Trigger, VirtualClock};
+use hachi_slam::Slam;
+use hachi_unitree::device::{HighClient, MemoryLink, SimulatedRobotConfig, SimulatedService};
+use hachi_world::{LiveLidar, SensorKind, SimulationConfig};
+
+use super::settings::Platform;
+use super::simulator::{MemoryPackets, SimulatorTask, Truth, WalkingBody};
+use super::wiring::{Devices, Running, Service, assemble};
+use crate::config::Settings;
+use crate::exit::Failure;
+use crate::recorder::Recorder;
+
+/// The other side of the wires goes first: what it sends at a moment is there at that moment.
+const SIMULATOR: TaskSpec = TaskSpec {
+    name: "simulator",
+    trigger: Trigger::Period {
+        period_ns: 1_000_000,
+    },
+    budget_ns: i64::MAX,
+    priority: 99,
+    core: None,
+    parallel: true,
+    overrun: Overrun::Skip,
+    hard: false,
+    ladder: &[],
+};
+
+/// Whose packets a world's LiDAR sends.
+pub fn sensor_of(world: &SimulationConfig) -> Sensor {
+    match world.sensor {
+        SensorKind::Helios16P => Sensor::Robosense,
+        _ => Sensor::Velodyne,
+    }
+}
+
+/// The service on one end of the wires, the simulated robot on the other; and where that truly is.
+///
+/// # Errors
+/// The settings do not fit together.
+pub fn connect(
+    settings: &Settings,
+    platform: &Platform,
+    world: &SimulationConfig,
+    clock: &VirtualClock,
+    running: Running,
+    (slam, recorder): (Slam, Option<Recorder>),
+) -> Result<(Service, Truth), Failure> {
+    let link = MemoryLink::new(clock.clone());
+    let packets = MemoryPackets::default();
+    let truth = Truth::default();
+    let robot = platform.robot;
+    let client = HighClient::over(robot, platform.client(&settings.robot), link.clone())
+        .map_err(|error| Failure::new(error, "please report this"))?;
+    let devices = Devices {
+        platform: *platform,
+        client,
+        packets: packets.clone(),
+        sensor: sensor_of(world),
+    };
+    let tasks = TaskClock::new(clock.clone());
+    let mut service = assemble(settings, devices, slam, tasks, running, recorder)?;
+    let body = WalkingBody::standing(platform, world);
+    let config = SimulatedRobotConfig::for_robot(robot);
+    let simulator = SimulatorTask {
+        robot: SimulatedService::new(&robot.layout, body, config),
+        link,
+        lidar: LiveLidar::new(world.clone()),
+        packets,
+        truth: truth.clone(),
+    };
+    let table = &mut service.table;
+    table.add(SIMULATOR, table.bell(), vec![], Box::new(simulator));
+    Ok((service, truth))
+}
