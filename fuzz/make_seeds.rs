@@ -409,7 +409,7 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 21] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 23] = [
         ("canbus", canbus()),
         ("imu", imu()),
         ("realsense", realsense()),
