@@ -26,7 +26,7 @@
 //! | [`slam_stage`] | SLAM as a stage of the flow |
 //! | [`task_table`] | the task table as people read it |
 //! | [`results`] | the files of a run |
-//! | [`saved_maps`] | saved maps as the commands open them |
+//! | [`saved_maps`], [`saved_people`] | saved maps, and the people the robot knows, as the commands open them |
 
 pub mod cli;
 pub mod commands;
@@ -54,6 +54,7 @@ pub mod recording;
 pub mod report;
 pub mod results;
 pub mod saved_maps;
+pub mod saved_people;
 pub mod service;
 pub mod slam_stage;
 pub mod task_table;

@@ -1,5 +1,7 @@
 //! Arguments of the commands about people.
 
+pub mod enrolled;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -7,12 +9,26 @@ use hachi_world::scenes::Script;
 
 /// What can be done about people.
 #[derive(Debug, Subcommand)]
-#[command(after_help = "Example:\n  hachi people track det/det.txt --out tracks.txt")]
+#[command(after_help = "\
+Example:
+  hachi people track det/det.txt --out tracks.txt
+  hachi people enrol Anna pictures-of-anna
+  hachi people list")]
 pub enum People {
     /// Follow everyone from frame to frame.
     Track(PeopleTrackArguments),
     /// Find the person of some pictures in other images.
     Find(PeopleFindArguments),
+    /// Who the robot knows.
+    List(enrolled::PeopleListArguments),
+    /// Make the robot know somebody from pictures of them.
+    Enrol(enrolled::PeopleEnrolArguments),
+    /// Give somebody another name.
+    Rename(enrolled::PeopleRenameArguments),
+    /// Write all that is kept of somebody to a folder, for them to take.
+    Export(enrolled::PeopleExportArguments),
+    /// Forget somebody: nothing of them is left in any file.
+    Forget(enrolled::PeopleForgetArguments),
 }
 
 /// Which networks to use.
