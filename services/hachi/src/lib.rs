@@ -20,6 +20,8 @@
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
 //! | [`images`] | folders of images |
 //! | [`networks`] | which networks find people and tell them apart |
+//! | [`people_pictures`] | frames with everybody marked, contact sheets |
+//! | [`people_truth`] | whom a simulated picture truly shows |
 //! | [`mot_files`] | files of boxes and tracks |
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
@@ -44,6 +46,8 @@ pub mod mot_files;
 pub mod motion_samples;
 pub mod networks;
 pub mod output;
+pub mod people_pictures;
+pub mod people_truth;
 pub mod precision_recall_picture;
 pub mod progress;
 pub mod record;
