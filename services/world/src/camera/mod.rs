@@ -6,10 +6,11 @@
 //! bytes, for any number of threads.
 //!
 //! Depth is what a stereo camera measures: its error is one of disparity and grows with the square of
-//! the distance; what only one imager sees has none. Light comes from above, and glass is seen
-//! through.
+//! the distance; what only one imager sees has none. Glass is seen through, and nothing throws a
+//! shadow ([`Light`]).
 
 mod bytes;
+mod light;
 mod render;
 mod truth;
 
@@ -18,6 +19,7 @@ use std::sync::Arc;
 use hachi_hal::{Distortion, Intrinsics, Pose, RgbdGeometry, Stamp};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
+pub use light::Light;
 pub use truth::{PersonTruth, PixelBox};
 
 use crate::person::{Body, Person};
@@ -42,6 +44,8 @@ pub struct CameraConfig {
     pub range_m: [f64; 2],
     /// Standard deviation of a colour's luma, counts.
     pub luma_sigma: f64,
+    /// What the colour picture is taken in.
+    pub light: Light,
     /// From one frame to the next, ns.
     pub period_ns: i64,
 }
@@ -75,6 +79,7 @@ impl CameraConfig {
             disparity_sigma_px: 0.08,
             range_m: [0.4, 20.0],
             luma_sigma: 2.0,
+            light: Light::default(),
             period_ns: 33_333_333,
         }
     }
@@ -181,14 +186,23 @@ impl SimulatedCamera {
 
     /// The next frame; `None` after the end of the simulation.
     pub fn next_frame(&mut self) -> Option<&CameraFrame> {
+        self.next_of(true)
+    }
+
+    /// The next frame without its depth, which takes most of the time: that picture stays as it was.
+    pub fn next_color_frame(&mut self) -> Option<&CameraFrame> {
+        self.next_of(false)
+    }
+
+    fn next_of(&mut self, with_depth: bool) -> Option<&CameraFrame> {
         let stamp = self.next_stamp()?;
-        self.expose(stamp);
+        self.expose(stamp, with_depth);
         self.frame.sequence = self.next;
         self.next = self.next.saturating_add(1);
         Some(&self.frame)
     }
 
-    fn expose(&mut self, stamp: Stamp) {
+    fn expose(&mut self, stamp: Stamp, with_depth: bool) {
         let time_s = stamp.secs_since(self.start);
         let floor = self.scene.floor();
         self.bodies.clear();
@@ -207,17 +221,20 @@ impl SimulatedCamera {
         let view = render::View {
             scene: &self.scene,
             bodies: &self.bodies,
+            lighting: self.config.light.at(time_s),
             seed: self.seed,
             frame: u64::from(self.next),
         };
         let frame = &mut self.frame;
         frame.stamp = stamp;
-        view.depth(
-            &self.config,
-            &self.depth_lens,
-            &map_from_depth,
-            &mut frame.depth,
-        );
+        if with_depth {
+            view.depth(
+                &self.config,
+                &self.depth_lens,
+                &map_from_depth,
+                &mut frame.depth,
+            );
+        }
         let (color, masks) = (&mut frame.color, &mut frame.masks);
         view.color(
             &self.config,
