@@ -24,6 +24,9 @@ const HEADING: &str = "hachi people keys 1 ";
 const END: &str = "end";
 /// Far more than all keys together.
 const MOST_BYTES: u64 = 1 << 20;
+/// A file that is replaced while it is read may be caught when its old bytes are overwritten; the
+/// next time it is the new one.
+const ATTEMPTS: usize = 3;
 /// The owner alone.
 const MODE: u32 = 0o600;
 
@@ -48,6 +51,17 @@ impl KeyRing {
 
     /// Reads a key file; `None` if there is none.
     pub(super) fn read(path: &Path) -> Result<Option<Self>, PeopleError> {
+        let mut read = Self::read_once(path);
+        for _ in 1..ATTEMPTS {
+            if !matches!(read, Err(PeopleError::DamagedKeys { .. })) {
+                break;
+            }
+            read = Self::read_once(path);
+        }
+        read
+    }
+
+    fn read_once(path: &Path) -> Result<Option<Self>, PeopleError> {
         let problem = |error: io::Error| PeopleError::of_system(path, &error);
         let file = match File::open(path) {
             Ok(file) => file,
