@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use hachi_odometry::Condition;
 use hachi_runtime::{Histogram, Summary};
+use hachi_slam::SlamCondition;
 use serde::Serialize;
 
 use crate::exit::Failure;
@@ -51,6 +52,9 @@ pub struct Report {
     pub dropped: BTreeMap<String, u64>,
     /// How far the poses can be trusted.
     pub conditions: ConditionCounts,
+    /// How far their places on the map could be trusted, with SLAM.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub map_conditions: Option<MapConditionCounts>,
     /// Threads that worked.
     pub threads: usize,
     /// The most memory the process held, MiB; absent where the system does not say.
@@ -84,6 +88,31 @@ impl ConditionCounts {
             Condition::Ok => self.ok += 1,
             Condition::Degraded(_) => self.degraded += 1,
             Condition::Lost(_) => self.lost += 1,
+        }
+    }
+}
+
+/// How far the places on the map could be trusted when they were found: how many of each condition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct MapConditionCounts {
+    /// As usual.
+    pub ok: u64,
+    /// Carried or guessed in part.
+    pub degraded: u64,
+    /// Not on the map.
+    pub lost: u64,
+    /// Found again, and not yet confirmed.
+    pub recovering: u64,
+}
+
+impl MapConditionCounts {
+    /// One more scan.
+    pub fn count(&mut self, condition: &SlamCondition) {
+        match condition {
+            SlamCondition::Ok => self.ok += 1,
+            SlamCondition::Degraded(_) => self.degraded += 1,
+            SlamCondition::Lost(_) => self.lost += 1,
+            SlamCondition::Recovering(_) => self.recovering += 1,
         }
     }
 }

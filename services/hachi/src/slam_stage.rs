@@ -14,7 +14,7 @@ use tracing::{info, warn};
 
 use crate::exit::Failure;
 use crate::map_builder::MapBuilder;
-use crate::report::Report;
+use crate::report::{MapConditionCounts, Report};
 
 /// The stage.
 #[derive(Debug)]
@@ -25,6 +25,7 @@ pub struct SlamStage {
     scans: Vec<(Stamp, Pose)>,
     /// Where the last of them was.
     place: Option<SlamEstimate>,
+    conditions: MapConditionCounts,
     points: Vec<Point>,
     events: SlamEvents,
     store_fails: bool,
@@ -41,6 +42,7 @@ impl SlamStage {
             slam,
             base_from_lidar,
             place: None,
+            conditions: MapConditionCounts::default(),
             scans: Vec::new(),
             points: Vec::new(),
             events: SlamEvents::default(),
@@ -104,6 +106,7 @@ impl SlamStage {
             points,
         };
         let placed = self.slam.step(&scan, &mut self.events);
+        self.conditions.count(&placed.condition);
         self.place = Some(placed);
         self.say();
         placed
@@ -211,6 +214,7 @@ impl SlamStage {
     /// Puts the loops, and what of the map was lost, into a report.
     pub fn fill(&self, report: &mut Report) {
         report.loops = self.loop_counts().into();
+        report.map_conditions = Some(self.conditions);
         report.submaps_given_up = self.slam.map().submaps_given_up();
     }
 

@@ -27,6 +27,8 @@ fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
     );
     assert!(report["ate_rmse_m"].as_f64().unwrap() < 0.08, "{report}");
     assert_eq!(report["conditions"]["lost"], 0, "{report}");
+    // A map that begins here is trusted from its first scan on.
+    assert_eq!(report["map_conditions"]["ok"], report["conditions"]["ok"]);
 
     // The figure of the report, measured once more from the files.
     let evaluated = program::run(&[
