@@ -32,7 +32,7 @@ pub enum People {
 }
 
 /// Which networks to use.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct NetworkArguments {
     /// Folder of ONNX models with their manifests [default: HACHI_MODELS, else models in HACHI_DATA].
     #[arg(long, value_name = "DIR")]

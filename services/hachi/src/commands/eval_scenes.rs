@@ -9,13 +9,13 @@ use std::time::{Duration, Instant};
 use hachi_inference::ImageView;
 use hachi_people::BoundingBox;
 use hachi_people::followed::{Score, ScoreKeeper};
-use hachi_people::identify::{AppearanceModel, Calibration, Condition, IdentifierConfig, Status};
+use hachi_people::identify::{AppearanceModel, Calibration, IdentifierConfig};
 use hachi_people::observe::{Observation, Observer};
 use hachi_people::track::Track;
 use hachi_people::watch::Watch;
 use hachi_realsense::frame::{Layout, YuyvImage};
+use hachi_world::SimulatedCamera;
 use hachi_world::scenes::{Script, ScriptedScene};
-use hachi_world::{CameraFrame, SimulatedCamera};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -263,7 +263,7 @@ impl SceneRun {
         let at_s = frame.stamp.secs_since(self.scene.simulation.start);
         let user_points = self.picked.is_none() && at_s >= self.scene.picked_at_s;
         if let Some(at) = user_points
-            .then(|| target_at(frame, self.scene.target))
+            .then(|| people_truth::pointed_at(&frame.people, self.scene.target))
             .flatten()
         {
             self.watch.pick(at);
@@ -285,7 +285,9 @@ impl SceneRun {
             let boxes = [
                 seen(tracks, self.picked).map(Track::bounding_box),
                 self.follow_me.step(tracks, &observed, self.picked),
-                followed(tracks, status.as_ref()).map(Track::bounding_box),
+                status
+                    .and_then(|status| self.watch.followed(status.person))
+                    .map(Track::bounding_box),
             ];
             let target = self.scene.target;
             let person = frame.people.iter().find(|person| person.id == target);
@@ -358,20 +360,6 @@ impl FollowMe {
 fn seen(tracks: &[Track], id: Option<u64>) -> Option<&Track> {
     let track = tracks.iter().find(|track| Some(track.id) == id);
     track.filter(|track| track.is_seen())
-}
-
-/// Who is followed where a status says so. One that is unsure follows nobody.
-fn followed<'a>(tracks: &'a [Track], status: Option<&Status>) -> Option<&'a Track> {
-    let status = status?;
-    match status.condition {
-        Condition::Seen | Condition::Found => seen(tracks, status.track),
-        _ => None,
-    }
-}
-
-fn target_at(frame: &CameraFrame, target: u32) -> Option<[f64; 2]> {
-    let person = frame.people.iter().find(|person| person.id == target)?;
-    people_truth::pointed_at(person)
 }
 
 fn text(report: &Report) -> String {

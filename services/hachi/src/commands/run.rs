@@ -29,6 +29,7 @@ use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::recorder::Recorder;
+use crate::service::eyes;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
 use crate::service::web::{self, Page};
@@ -57,6 +58,7 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
     if recording.is_some() {
         settings.patrol.places.clear();
         settings.service.map = None;
+        settings.people.enabled = false;
     }
     let clock = SystemClock::new();
     let config = platform.client(&settings.robot);
@@ -71,6 +73,7 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
             LidarKind::Vlp16 => Sensor::Velodyne,
             LidarKind::Helios16p => Sensor::Robosense,
         },
+        eyes: eyes::of_this_computer(&settings, clock),
     };
     let listen = settings.service.listen;
     let listener = web::listen(listen)

@@ -21,6 +21,8 @@ pub struct Supervisor {
     pub signs: SharedSigns,
     /// What is told.
     pub health: Health,
+    /// Whether there is to be a camera.
+    pub has_camera: bool,
     /// When it began.
     pub begun: Option<Stamp>,
     /// Whether all was there once, or was waited for.
@@ -44,6 +46,10 @@ impl Work for Supervisor {
         };
         self.tell(Trouble::LidarLost, lost(&signs.scan));
         self.tell(Trouble::RobotLost, lost(&signs.robot));
+        self.tell(Trouble::CameraLost, self.has_camera && lost(&signs.camera));
+        let no_model = signs.model_missing.load(Ordering::Relaxed)
+            || signs.network_fails.load(Ordering::Relaxed);
+        self.tell(Trouble::ModelMissing, no_model);
         let poor = !matches!(signs.condition.get(), "OK" | "UNKNOWN");
         self.tell(Trouble::LocalisationPoor, poor);
         let full = signs.store_fails.load(Ordering::Relaxed)
