@@ -65,7 +65,7 @@ mod smooth;
 pub mod trajectory;
 mod vlp16;
 
-pub use camera::{CameraConfig, CameraFrame, PersonTruth, PixelBox, SimulatedCamera};
+pub use camera::{CameraConfig, CameraFrame, Light, PersonTruth, PixelBox, SimulatedCamera};
 pub use capture::{CaptureError, CaptureWriter, write_pcap, write_tum};
 pub use commanded::CommandedBody;
 pub use floor::{Floor, RaisedFloor, Terrain, Wave};

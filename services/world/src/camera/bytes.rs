@@ -35,6 +35,6 @@ pub(super) fn yuyv_pair(first: [f64; 3], second: [f64; 3]) -> [u8; 4] {
 }
 
 /// A colour under so much light.
-pub(super) fn lit(color: Rgb, light: f64) -> [f64; 3] {
-    color.map(|c| f64::from(c) * light)
+pub(super) fn lit(color: Rgb, light: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|channel| f64::from(color[channel]) * light[channel])
 }

@@ -6,10 +6,11 @@
 //! bytes, for any number of threads.
 //!
 //! Depth is what a stereo camera measures: its error is one of disparity and grows with the square of
-//! the distance; what only one imager sees has none. Light comes from above, and glass is seen
-//! through.
+//! the distance; what only one imager sees has none. Glass is seen through, and nothing throws a
+//! shadow ([`Light`]).
 
 mod bytes;
+mod light;
 mod render;
 mod truth;
 
@@ -18,6 +19,7 @@ use std::sync::Arc;
 use hachi_hal::{Distortion, Intrinsics, Pose, RgbdGeometry, Stamp};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
+pub use light::Light;
 pub use truth::{PersonTruth, PixelBox};
 
 use crate::person::{Body, Person};
@@ -42,6 +44,8 @@ pub struct CameraConfig {
     pub range_m: [f64; 2],
     /// Standard deviation of a colour's luma, counts.
     pub luma_sigma: f64,
+    /// What the colour picture is taken in.
+    pub light: Light,
     /// From one frame to the next, ns.
     pub period_ns: i64,
 }
@@ -75,6 +79,7 @@ impl CameraConfig {
             disparity_sigma_px: 0.08,
             range_m: [0.4, 20.0],
             luma_sigma: 2.0,
+            light: Light::default(),
             period_ns: 33_333_333,
         }
     }
@@ -207,6 +212,7 @@ impl SimulatedCamera {
         let view = render::View {
             scene: &self.scene,
             bodies: &self.bodies,
+            lighting: self.config.light.at(time_s),
             seed: self.seed,
             frame: u64::from(self.next),
         };

@@ -9,6 +9,7 @@ use parry3d::query::Ray;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::light::Lighting;
 use super::truth::PixelBox;
 use super::{CameraConfig, bytes};
 use crate::noise::{Purpose, generator, normal_pair};
@@ -26,8 +27,6 @@ const SAME_M: f32 = 0.02;
 const SAME_SHARE: f32 = 0.01;
 /// Disparities are found in these steps, pixels.
 const DISPARITY_STEP_PX: f64 = 1.0 / 32.0;
-/// Share of the light that comes from everywhere; the rest comes from above.
-const AMBIENT: f32 = 0.6;
 /// What is seen where there is nothing.
 const SKY: Rgb = [205, 220, 235];
 
@@ -71,6 +70,7 @@ struct Surface {
 pub(super) struct View<'a> {
     pub scene: &'a Scene,
     pub bodies: &'a [Body],
+    pub lighting: Lighting,
     pub seed: u64,
     pub frame: u64,
 }
@@ -126,10 +126,10 @@ impl View<'_> {
                 let dir = narrow(map_from_camera.rotation * look);
                 let surface = self.first(&Ray::new(eye, dir));
                 *mask = surface.as_ref().map_or(0, |surface| surface.mask);
-                let lit = surface.map_or(bytes::lit(SKY, 1.0), |s| {
-                    let light = AMBIENT + (1.0 - AMBIENT) * s.normal.z.max(0.0);
-                    bytes::lit(s.color, f64::from(light))
+                let (color, light) = surface.map_or((SKY, self.lighting.sky()), |s| {
+                    (s.color, self.lighting.on(s.normal))
                 });
+                let lit = bytes::lit(color, light);
                 let [y, u, v] = bytes::yuv(lit);
                 [y + config.luma_sigma * normal_pair(&mut random)[0], u, v]
             };
