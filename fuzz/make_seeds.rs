@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use hachi_hal::{Distortion, Intrinsics, Pose, Stamp};
 use hachi_inference::known;
+use hachi_people::identify::AppearanceModel;
 use hachi_place::{Database, Describer, DescriberConfig, Descriptor, Profile};
 use hachi_realsense::encode as d400;
 use hachi_realsense::frame as d400_frame;
@@ -20,6 +21,8 @@ use hachi_slam::codec::encode;
 use hachi_slam::node::Ground;
 use hachi_slam::submap::{Submap, SubmapBuilder};
 use hachi_slam::{Map, Node, NodeId};
+use hachi_store::people::codec::{Record, encode_model, encode_record};
+use hachi_store::people::{NetworkIdentity, NewPerson, PeopleFile, PeoplePaths};
 use hachi_store::{Identity, MapFile};
 use hachi_unitree::frame as unitree;
 use hachi_velodyne::encode as vlp16;
@@ -272,6 +275,45 @@ fn leg_numbers() -> Vec<u8> {
     (0..600_u32).map(|i| (90 + i * 37 % 75) as u8).collect()
 }
 
+/// A person in view once.
+fn somebody() -> (NetworkIdentity, AppearanceModel) {
+    let network = NetworkIdentity {
+        name: "osnet".to_owned(),
+        sha256: [7; 32],
+    };
+    let model = AppearanceModel::first(&[0.6, -0.8, 0.1, 0.0]).expect("a feature");
+    (network, model)
+}
+
+/// A store of one person: length of the key file, key file, store.
+fn people_store() -> Result<Vec<u8>> {
+    let folder = tempfile::tempdir()?;
+    let paths = PeoplePaths::beside(&folder.path().join("seed.db"));
+    let mut store = PeopleFile::open_or_create(&paths).expect("a new file");
+    let (network, model) = somebody();
+    let person = NewPerson {
+        name: "Anna",
+        enrolled_unix_s: 1_700_000_000,
+        network: &network,
+        model: &model,
+        images: &[vec![1; 40]],
+    };
+    store.enrol(&person).expect("room for a temporary file");
+    drop(store);
+    let (key, file) = (fs::read(&paths.key)?, fs::read(&paths.file)?);
+    let length = (key.len() as u16).to_le_bytes();
+    Ok([&length[..], &key, &file].concat())
+}
+
+fn people_codec() -> Vec<Vec<u8>> {
+    let (network, model) = somebody();
+    let record = Record {
+        name: "Anna".to_owned(),
+        enrolled_unix_s: 1_700_000_000,
+    };
+    vec![encode_record(&record), encode_model(&network, &model)]
+}
+
 /// A floor and a wall as a submap.
 fn corner() -> Submap {
     let mut builder = SubmapBuilder::default();
@@ -367,7 +409,7 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 21] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 23] = [
         ("canbus", canbus()),
         ("imu", imu()),
         ("realsense", realsense()),
@@ -419,6 +461,8 @@ fn main() -> Result<()> {
         ("submap", vec![submap_bytes()]),
         ("place_database", places().to_vec()),
         ("map_file", vec![map_file()?]),
+        ("people_codec", people_codec()),
+        ("people_store", vec![people_store()?]),
         (
             "detector_outputs",
             (0..4)

@@ -145,7 +145,7 @@ const LAYERS: &[Layer] = &[
     },
     Layer {
         name: "hachi-store",
-        sees: &["hachi-hal", "hachi-slam"],
+        sees: &["hachi-hal", "hachi-slam", "hachi-people"],
         tests_see: &[],
         because: "the store keeps what stages hand it, and computes nothing",
     },

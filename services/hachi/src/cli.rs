@@ -77,6 +77,8 @@ pub enum Eval {
     Loops(loops::EvalLoopsArguments),
     /// Align two clouds with GICP.
     Registration(mapping::EvalRegistrationArguments),
+    /// How well one person is known again through ten scripted scenes.
+    Scenes(people::EvalScenesArguments),
     /// How well people were followed: MOTA, IDF1 and their parts.
     Tracks(people::EvalTracksArguments),
     /// Absolute and relative pose error of a trajectory, as evo computes them.

@@ -5,6 +5,7 @@ pub mod demo;
 pub mod doctor;
 pub mod eval_loops;
 pub mod eval_registration;
+pub mod eval_scenes;
 pub mod eval_tracks;
 pub mod eval_trajectory;
 pub mod graph_optimize;
@@ -35,6 +36,7 @@ pub fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Eval(Eval::Loops(arguments)) => eval_loops::run(&arguments),
         Command::Eval(Eval::Registration(arguments)) => eval_registration::run(&arguments),
+        Command::Eval(Eval::Scenes(arguments)) => eval_scenes::run(&arguments),
         Command::Eval(Eval::Tracks(arguments)) => eval_tracks::run(&arguments),
         Command::Eval(Eval::Trajectory(arguments)) => eval_trajectory::run(&arguments),
         Command::Map(command) => map::run(&command),

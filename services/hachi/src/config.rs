@@ -14,7 +14,9 @@ use hachi_slam::SlamConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
-use crate::service::settings::{LidarConfig, RobotConfig, RowConfig, ServiceConfig};
+use crate::service::settings::{
+    EmergencyStopConfig, LidarConfig, RobotConfig, RowConfig, ServiceConfig,
+};
 
 /// What is known of the motion besides the scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -116,6 +118,8 @@ pub struct Settings {
     pub robot: RobotConfig,
     /// The LiDAR's packets.
     pub lidar: LidarConfig,
+    /// An emergency stop besides the remote control's.
+    pub emergency_stop: EmergencyStopConfig,
     /// Limits of the gate.
     pub safety: SafetyConfig,
     /// Where it goes.

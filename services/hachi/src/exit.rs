@@ -39,6 +39,15 @@ impl Failure {
         }
     }
 
+    /// A library's message that ends with what to do, behind its last colon.
+    pub fn said(error: impl Display) -> Self {
+        let text = error.to_string();
+        match text.rsplit_once(": ") {
+            Some((what, next_step)) => Self::new(what, next_step),
+            None => Self::new(text, "check the path"),
+        }
+    }
+
     /// Writing to standard output failed.
     pub fn output(error: &io::Error) -> Self {
         match error.kind() {

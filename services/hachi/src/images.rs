@@ -8,6 +8,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use hachi_inference::{ImageError, ImageView};
+use hachi_people::BoundingBox;
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
@@ -40,6 +41,57 @@ impl Rgb {
     /// It has no pixel.
     pub fn view(&self) -> Result<ImageView<'_>, ImageError> {
         ImageView::new(self.width, self.height, &self.pixels)
+    }
+
+    /// What lies in a box, as far as it lies in the image; `None` if nothing does.
+    pub fn cut(&self, bounding_box: &BoundingBox) -> Option<Self> {
+        let b = bounding_box;
+        // Casts take what is no number, and what is below nought, for nought.
+        let (left, top) = (b.left.floor() as usize, b.top.floor() as usize);
+        let right = ((b.left + b.width).ceil() as usize).min(self.width);
+        let bottom = ((b.top + b.height).ceil() as usize).min(self.height);
+        let (width, height) = (right.checked_sub(left)?, bottom.checked_sub(top)?);
+        let row = |y: usize| &self.pixels[3 * (y * self.width + left)..][..3 * width];
+        (width > 0 && height > 0).then(|| Self {
+            width,
+            height,
+            pixels: (top..bottom).flat_map(|y| row(y).iter().copied()).collect(),
+        })
+    }
+
+    /// The image at half its size; each pixel is the mean of four.
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let at = |x: usize, y: usize, colour: usize| {
+            u16::from(self.pixels[3 * (y * self.width + x) + colour])
+        };
+        let mut pixels = Vec::with_capacity(3 * width * height);
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (2 * y, 2 * x))) {
+            pixels.extend((0..3).map(|c| {
+                let sum = at(x, y, c) + at(x + 1, y, c) + at(x, y + 1, c) + at(x + 1, y + 1, c);
+                (sum / 4) as u8
+            }));
+        }
+        Self {
+            width,
+            height,
+            pixels,
+        }
+    }
+
+    /// The image as a PNG file.
+    ///
+    /// # Errors
+    /// It has no pixel.
+    pub fn to_png(&self) -> Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.pixels)?;
+        writer.finish()?;
+        Ok(bytes)
     }
 }
 
@@ -217,6 +269,23 @@ mod tests {
         assert_eq!(decode(&rgba).unwrap().pixels, [1, 2, 3, 4, 5, 6]);
         let grey = written(png::ColorType::Grayscale, &[9, 8]);
         assert_eq!(decode(&grey).unwrap().pixels, [9, 9, 9, 8, 8, 8]);
+    }
+
+    #[test]
+    fn what_is_cut_out_halved_and_written_has_the_pixels_it_had() {
+        let image = Rgb {
+            width: 4,
+            height: 2,
+            pixels: (0..24).collect(),
+        };
+        let cut = image.cut(&BoundingBox::new(0.7, -3.0, 1.1, 4.5)).unwrap();
+        assert_eq!((cut.width, cut.height), (2, 2));
+        assert_eq!(cut.pixels, [0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17]);
+        assert_eq!(image.cut(&BoundingBox::new(4.0, 0.0, 2.0, 2.0)), None);
+        assert_eq!(image.cut(&BoundingBox::new(f64::NAN, 0.0, 0.0, 2.0)), None);
+        // Means of (0, 3, 12, 15) and so on, by hand.
+        assert_eq!(image.halved().pixels, [7, 8, 9, 13, 14, 15]);
+        assert_eq!(decode(&image.to_png().unwrap()), Ok(image));
     }
 
     #[test]

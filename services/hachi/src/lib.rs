@@ -16,16 +16,20 @@
 //! | [`record`] | what a run has done so far |
 //! | [`service`] | the service on a robot, task by task |
 //! | [`config`] | settings |
+//! | [`can`] | CAN interfaces of this machine |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
 //! | [`images`] | folders of images |
 //! | [`networks`] | which networks find people and tell them apart |
+//! | [`people_pictures`] | frames with everybody marked, contact sheets |
+//! | [`people_truth`] | whom a simulated picture truly shows |
 //! | [`mot_files`] | files of boxes and tracks |
 //! | [`precision_recall_picture`] | precision over recall |
 //! | [`slam_stage`] | SLAM as a stage of the flow |
 //! | [`task_table`] | the task table as people read it |
 //! | [`results`] | the files of a run |
-//! | [`saved_maps`] | saved maps as the commands open them |
+//! | [`saved_maps`], [`saved_people`] | saved maps, and the people the robot knows, as the commands open them |
 
+pub mod can;
 pub mod cli;
 pub mod commands;
 pub mod config;
@@ -42,6 +46,8 @@ pub mod mot_files;
 pub mod motion_samples;
 pub mod networks;
 pub mod output;
+pub mod people_pictures;
+pub mod people_truth;
 pub mod precision_recall_picture;
 pub mod progress;
 pub mod record;
@@ -50,6 +56,7 @@ pub mod recording;
 pub mod report;
 pub mod results;
 pub mod saved_maps;
+pub mod saved_people;
 pub mod service;
 pub mod slam_stage;
 pub mod task_table;

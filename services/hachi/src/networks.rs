@@ -16,11 +16,28 @@ use hachi_people::observe::Observer;
 use crate::cli::people::NetworkArguments;
 use crate::exit::Failure;
 
+/// The files of the networks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Chosen {
+    /// Finds people.
+    pub detector: PathBuf,
+    /// Tells them apart.
+    pub appearance: Option<PathBuf>,
+}
+
 /// A detector of people and, where there is one, a network that tells them apart.
 ///
 /// # Errors
 /// There is no detector, or a model can't be used.
 pub fn observer(arguments: &NetworkArguments) -> Result<Observer, Failure> {
+    chosen(arguments)?.open()
+}
+
+/// Which files the networks are in.
+///
+/// # Errors
+/// There is no detector, or the folder can't be read.
+pub fn chosen(arguments: &NetworkArguments) -> Result<Chosen, Failure> {
     let folder = folder(arguments);
     let is_detector = |decoder: &Decoder| !matches!(decoder, Decoder::Appearance { .. });
     let detector = find(
@@ -28,19 +45,36 @@ pub fn observer(arguments: &NetworkArguments) -> Result<Observer, Failure> {
         folder.as_deref(),
         is_detector,
     )?;
-    let detector = detector.ok_or_else(|| missing("detector", folder.as_deref()))?;
-    let detector = Detector::new(open(&detector)?, Wanted::People)
-        .map_err(|error| Failure::new(error, "give a detector with --detector"))?;
     let tells_apart = |decoder: &Decoder| matches!(decoder, Decoder::Appearance { .. });
-    let appearance = find(arguments.reid.as_deref(), folder.as_deref(), tells_apart)?;
-    let appearance = appearance
-        .map(|path| {
-            Appearance::new(open(&path)?).map_err(|error| {
+    Ok(Chosen {
+        detector: detector.ok_or_else(|| missing("detector", folder.as_deref()))?,
+        appearance: find(arguments.reid.as_deref(), folder.as_deref(), tells_apart)?,
+    })
+}
+
+impl Chosen {
+    /// Loads them.
+    ///
+    /// # Errors
+    /// A model can't be used.
+    pub fn open(&self) -> Result<Observer, Failure> {
+        let detector = Detector::new(open(&self.detector)?, Wanted::People)
+            .map_err(|error| Failure::new(error, "give a detector with --detector"))?;
+        let appearance = self.appearance.as_deref().map(|path| {
+            Appearance::new(open(path)?).map_err(|error| {
                 Failure::new(error, "give a re-identification network with --reid")
             })
-        })
-        .transpose()?;
-    Ok(Observer::new(detector, appearance))
+        });
+        Ok(Observer::new(detector, appearance.transpose()?))
+    }
+}
+
+/// There is no network that tells people apart.
+pub fn no_appearance() -> Failure {
+    Failure::new(
+        "there is no network that tells people apart",
+        "name one with --reid",
+    )
 }
 
 fn folder(arguments: &NetworkArguments) -> Option<PathBuf> {

@@ -12,11 +12,7 @@ use crate::exit::Failure;
 
 /// A failure of a map file: its message ends with what to do.
 pub fn failure(error: &MapError) -> Failure {
-    let text = error.to_string();
-    match text.rsplit_once(": ") {
-        Some((what, next_step)) => Failure::new(what, next_step),
-        None => Failure::new(text, "check the path"),
-    }
+    Failure::said(error)
 }
 
 /// Who makes or uses a map: recordings do not name their sensor, so any fits.

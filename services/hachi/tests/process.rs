@@ -36,6 +36,42 @@ fn a_killed_service_leaves_the_robot_standing_and_the_map_whole() {
 }
 
 #[test]
+fn on_another_building_s_map_nobody_moves_the_robot() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let office = folder.path().join("office.map");
+    let mapped = run(&[
+        "demo",
+        "--seconds",
+        "20",
+        "--headless",
+        "--map",
+        text(&office),
+        "--out",
+        text(&folder.path().join("out")),
+    ]);
+    assert!(
+        mapped.status == 0 && nodes(&office) > 3,
+        "{}",
+        mapped.stderr
+    );
+    let rig = Rig::in_world("b1", "glass-corridor");
+    std::fs::copy(&office, rig.map()).unwrap();
+    let service = rig.run(&rig.write(&rig.settings()));
+    until("it says that it does not know the place", || {
+        service.said("localisation poor")
+    });
+    let begun = rig.now().time_s;
+    until("five seconds are over", || rig.now().time_s > begun + 5.0);
+    assert_eq!(rig.now().way_m, 0.0);
+    let status: serde_json::Value = {
+        let top = run(&["top", "--json", "--address", &rig.http.to_string()]);
+        top.json()
+    };
+    assert_ne!(status["localisation"], "OK", "{status}");
+}
+
+#[test]
 fn a_service_that_is_asked_to_stop_does_and_systemd_hears_of_everything() {
     let _alone = alone();
     let rig = Rig::new("go1");

@@ -13,6 +13,8 @@
 //! | [`observe`] | from an image to people with features |
 //! | [`track`] | the tracker: Kalman boxes, gated assignment, birth and death |
 //! | [`identify`] | which of them is the robot's person: FollowMe and CARPE-ID |
+//! | [`watch`] | all of it, frame by frame: who is where |
+//! | [`followed`] | how well one person was followed, against the truth |
 //! | [`recording`] | tracks of a whole recording, completed once it is over |
 //! | [`mot`] | MOTChallenge text: detections, truth and results |
 //! | [`metrics`] | MOTA, IDF1 and their parts, as py-motmetrics computes them |
@@ -23,6 +25,7 @@ pub mod appearance;
 pub mod assignment;
 pub mod bounding_box;
 pub mod detect;
+pub mod followed;
 pub mod gallery;
 pub mod identify;
 pub mod metrics;
@@ -30,5 +33,6 @@ pub mod mot;
 pub mod observe;
 pub mod recording;
 pub mod track;
+pub mod watch;
 
 pub use bounding_box::BoundingBox;

@@ -54,6 +54,12 @@ impl Observer {
         self.detector.even_score()
     }
 
+    /// What the detector found in the last image; with a detector that looks for people alone, the
+    /// detections of the last observation, in their order, with their masks.
+    pub fn found(&self) -> &[Found] {
+        self.detector.found()
+    }
+
     /// The network that tells people apart.
     pub fn appearance(&mut self) -> Option<&mut Appearance> {
         self.appearance.as_mut()

@@ -1,21 +1,25 @@
-//! A disk that is full for long: the robot goes on, memory stays bounded, and what was lost is counted.
+//! A disk that is full for long: the robot goes on, memory stays bounded, and what was lost is counted;
+//! and maps of more nodes than may wait for a disk that is not.
 
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use hachi_hal::{Pose, Stamp};
 use hachi_slam::codec;
+use hachi_slam::merge::{MergeError, merge};
 use hachi_slam::node::{Ground, PieceId};
 use hachi_slam::store::MapChange;
 use hachi_slam::submap::{Submap, SubmapPoint};
-use hachi_slam::{Map, Node, NodeId, StoreError, StoreFault, SubmapStore};
+use hachi_slam::{Map, Node, NodeId, SlamConfig, StoreError, StoreFault, SubmapStore};
 use nalgebra::Matrix6;
 
-/// Keeps how many surfaces each node came with, unless it is full.
+/// Keeps what each node came with, and how many surfaces that is, unless it is full.
 #[derive(Clone, Default)]
 struct Disk {
     is_full: Arc<AtomicBool>,
     surfaces: Arc<Mutex<Vec<usize>>>,
+    submaps: Arc<Mutex<HashMap<NodeId, Vec<u8>>>>,
 }
 
 impl SubmapStore for Disk {
@@ -30,15 +34,20 @@ impl SubmapStore for Disk {
         for new in change.nodes {
             codec::decode(new.submap, &mut submap).unwrap();
             self.surfaces.lock().unwrap().push(submap.points.len());
+            let mut submaps = self.submaps.lock().unwrap();
+            submaps.insert(new.node.id, new.submap.to_vec());
         }
         Ok(())
     }
 
-    fn submap(&mut self, _: NodeId, _: &mut Vec<u8>) -> Result<(), StoreError> {
-        Err(StoreError {
+    fn submap(&mut self, node: NodeId, bytes: &mut Vec<u8>) -> Result<(), StoreError> {
+        let submaps = self.submaps.lock().unwrap();
+        let kept = submaps.get(&node).ok_or_else(|| StoreError {
             fault: StoreFault::Full,
             message: "nothing was kept".to_owned(),
-        })
+        })?;
+        bytes.clone_from(kept);
+        Ok(())
     }
 }
 
@@ -102,4 +111,35 @@ fn what_a_full_disk_does_not_take_is_bounded_and_counted_and_the_rest_comes_back
     let given_up = (NODES - MOST_PENDING) as usize;
     assert!(kept[..given_up].iter().all(|n| *n == 0));
     assert!(kept[given_up..].iter().all(|n| *n == 100));
+}
+
+#[test]
+fn a_merge_of_long_maps_keeps_every_submap() {
+    const NODES: u32 = 300;
+    let long = || {
+        let mut map = Map::new(Box::new(Disk::default()), 1);
+        map.begin_piece();
+        for id in 0..NODES {
+            add(&mut map, id);
+            map.commit(false).unwrap();
+        }
+        map
+    };
+    let disk = Disk::default();
+    let merged = merge(
+        &mut long(),
+        &mut long(),
+        Box::new(disk.clone()),
+        &SlamConfig::default(),
+        |_| (),
+    );
+    // A bare wall is no place that could be recognised; by then everything is copied.
+    assert!(
+        matches!(merged, Err(MergeError::Apart)),
+        "{:?}",
+        merged.err()
+    );
+    let kept = disk.surfaces.lock().unwrap().clone();
+    assert_eq!(kept.len(), 2 * NODES as usize);
+    assert!(kept.iter().all(|surfaces| *surfaces == 100));
 }

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use hachi_slam::{StoreError, StoreFault};
-use rusqlite::ErrorCode;
+
+use crate::fault::Fault;
 
 /// What is wrong with a map file. Each says what to do.
 #[derive(Debug, thiserror::Error)]
@@ -92,22 +93,13 @@ impl MapError {
     pub(crate) fn of(path: &Path, error: &rusqlite::Error) -> Self {
         let path = path.to_owned();
         let what = error.to_string();
-        let Some(code) = error.sqlite_error_code() else {
-            // A column of another type, a row that is missing: the tables are not what we write.
-            return Self::Damaged { path, what };
-        };
-        match code {
-            ErrorCode::DiskFull => Self::Full { path },
-            ErrorCode::ReadOnly | ErrorCode::PermissionDenied => Self::ReadOnly { path },
-            ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked => Self::InUse { path },
-            ErrorCode::NotADatabase => Self::NotAMap { path, seen: what },
-            ErrorCode::DatabaseCorrupt
-            | ErrorCode::TypeMismatch
-            | ErrorCode::TooBig
-            | ErrorCode::OperationInterrupted
-            | ErrorCode::ConstraintViolation
-            | ErrorCode::Unknown => Self::Damaged { path, what },
-            _ => Self::Other { path, what },
+        match Fault::of(error) {
+            Fault::Full => Self::Full { path },
+            Fault::ReadOnly => Self::ReadOnly { path },
+            Fault::InUse => Self::InUse { path },
+            Fault::NotADatabase => Self::NotAMap { path, seen: what },
+            Fault::Damaged => Self::Damaged { path, what },
+            Fault::CannotOpen | Fault::Other => Self::Other { path, what },
         }
     }
 }

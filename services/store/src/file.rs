@@ -75,7 +75,7 @@ impl MapFile {
         let made = || -> rusqlite::Result<Connection> {
             let mut connection = Connection::open_with_flags(path, flags)?;
             write_safely(&connection)?;
-            schema::guard(&connection)?;
+            schema::guard(&connection, schema::LARGEST_VALUE)?;
             let transaction = connection.transaction()?;
             transaction.pragma_update(None, "application_id", APPLICATION_ID)?;
             transaction.pragma_update(None, "user_version", VERSION)?;
@@ -113,7 +113,7 @@ impl MapFile {
         }
         let problem = |error: rusqlite::Error| cannot_open(path, &error);
         let connection = connect(path, access).map_err(problem)?;
-        schema::guard(&connection).map_err(problem)?;
+        schema::guard(&connection, schema::LARGEST_VALUE).map_err(problem)?;
         check_kind(&connection, path)?;
         if access == Access::Write {
             write_safely(&connection).map_err(problem)?;
@@ -177,15 +177,7 @@ impl MapFile {
     /// # Errors
     /// The file can't be read.
     pub fn set_quota(&self, bytes: u64) -> Result<(), MapError> {
-        let set = || -> rusqlite::Result<()> {
-            let page: i64 = self
-                .connection
-                .pragma_query_value(None, "page_size", |row| row.get(0))?;
-            let pages = i64::try_from(bytes).unwrap_or(i64::MAX) / page.max(1);
-            self.connection
-                .pragma_update(None, "max_page_count", pages.max(1))
-        };
-        set().map_err(|error| MapError::of(&self.path, &error))
+        set_quota(&self.connection, bytes).map_err(|error| MapError::of(&self.path, &error))
     }
 
     /// Reads everything but the submaps.
@@ -252,6 +244,13 @@ impl SubmapStore for MapFile {
     fn submap(&mut self, node: NodeId, bytes: &mut Vec<u8>) -> Result<(), StoreError> {
         self.read_submap(node, bytes).map_err(StoreError::from)
     }
+}
+
+/// Lets a data base grow to so many bytes.
+pub(crate) fn set_quota(connection: &Connection, bytes: u64) -> rusqlite::Result<()> {
+    let page: i64 = connection.pragma_query_value(None, "page_size", |row| row.get(0))?;
+    let pages = i64::try_from(bytes).unwrap_or(i64::MAX) / page.max(1);
+    connection.pragma_update(None, "max_page_count", pages.max(1))
 }
 
 /// One writer at a time, every transaction on the disk when it is done.
@@ -325,7 +324,9 @@ fn check_kind(connection: &Connection, path: &Path) -> Result<(), MapError> {
             supported: VERSION,
         });
     }
-    match schema::missing_table(connection).map_err(|error| cannot_open(path, &error))? {
+    match schema::missing_table(connection, &schema::NAMES)
+        .map_err(|error| cannot_open(path, &error))?
+    {
         None => Ok(()),
         Some(name) => Err(MapError::Damaged {
             path: path.to_owned(),

@@ -1,6 +1,6 @@
-//! What must survive a power cut: a map in one file.
+//! What must survive a power cut: a map in one file, and the people the robot knows ([`people`]).
 //!
-//! In: nodes, submaps, edges and ledger entries as SLAM hands them out
+//! A map. In: nodes, submaps, edges and ledger entries as SLAM hands them out
 //! ([`hachi_slam::SubmapStore`]). Out: the same after the next start, or a [`MapError`] that says
 //! what is wrong with the file and what to do.
 //!
@@ -16,11 +16,15 @@
 //! | `rows` | poses, matrices and ledger entries as columns |
 //! | `load` | reading a whole map but its submaps |
 //! | [`error`] | what can be wrong |
+//! | `fault` | what SQLite's error codes mean |
+//! | [`people`] | people, encrypted |
 #![forbid(unsafe_code)]
 
 pub mod error;
+mod fault;
 pub mod file;
 mod load;
+pub mod people;
 mod rows;
 mod schema;
 

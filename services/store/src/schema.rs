@@ -11,7 +11,7 @@ pub(crate) const APPLICATION_ID: i64 = 0x4841_434d;
 pub(crate) const VERSION: i64 = 2;
 
 /// The largest value of one column, bytes: a submap has 60 kB.
-const LARGEST_VALUE: i32 = 1 << 20;
+pub(crate) const LARGEST_VALUE: i32 = 1 << 20;
 
 /// The tables. Poses are 7 numbers (x y z qx qy qz qw), information matrices 21 (rows of the upper
 /// triangle, translation first), both as little-endian f64.
@@ -43,19 +43,22 @@ pub(crate) const NAMES: [&str; 6] = ["about", "node", "submap", "place", "edge",
 
 /// A data base from elsewhere is a program: it may not run for long, ask for much, or be anything
 /// but plain tables.
-pub(crate) fn guard(connection: &Connection) -> rusqlite::Result<()> {
+pub(crate) fn guard(connection: &Connection, largest_value: i32) -> rusqlite::Result<()> {
     connection.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
     connection.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)?;
     connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false)?;
     connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false)?;
-    connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, LARGEST_VALUE)?;
+    connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, largest_value)?;
     connection.pragma_update(None, "cell_size_check", true)?;
     Ok(())
 }
 
-/// The first of our tables that is not there as a plain table.
-pub(crate) fn missing_table(connection: &Connection) -> rusqlite::Result<Option<&'static str>> {
-    for name in NAMES {
+/// The first of these tables that is not there as a plain table.
+pub(crate) fn missing_table(
+    connection: &Connection,
+    names: &[&'static str],
+) -> rusqlite::Result<Option<&'static str>> {
+    for &name in names {
         let plain: i64 = connection.query_row(
             "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = ?1 AND rootpage > 0",
             [name],

@@ -14,6 +14,7 @@
 //! | [`sensor`] | which sensors there are, and when their lasers fire |
 //! | [`simulation`], [`lidar`] | packet after packet; as a [`hachi_hal::PacketSource`] |
 //! | [`camera`], [`person`] | depth and colour pictures; the people in them |
+//! | [`scenes`] | ten scripted scenes with people |
 //! | [`imu`], [`odometry`] | the other sensors |
 //! | [`legs`] | joints, feet and body of a quadruped that walks the path |
 //! | [`commanded`], [`live`] | a quadruped that goes where it is told; the sensor on it |
@@ -59,6 +60,7 @@ pub mod preset;
 pub mod returns;
 pub mod scene;
 pub mod scene_builder;
+pub mod scenes;
 pub mod sensor;
 pub mod simulation;
 mod smooth;

@@ -13,6 +13,7 @@ pub(crate) enum Purpose {
     Strays = 5,
     Legs = 6,
     Camera = 7,
+    People = 8,
 }
 
 /// A generator of its own for `purpose` and the `index`-th thing of that purpose.

@@ -1,17 +1,34 @@
 //! Arguments of the commands about people.
 
+pub mod enrolled;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use hachi_world::scenes::Script;
 
 /// What can be done about people.
 #[derive(Debug, Subcommand)]
-#[command(after_help = "Example:\n  hachi people track det/det.txt --out tracks.txt")]
+#[command(after_help = "\
+Example:
+  hachi people track det/det.txt --out tracks.txt
+  hachi people enrol Anna pictures-of-anna
+  hachi people list")]
 pub enum People {
     /// Follow everyone from frame to frame.
     Track(PeopleTrackArguments),
     /// Find the person of some pictures in other images.
     Find(PeopleFindArguments),
+    /// Who the robot knows.
+    List(enrolled::PeopleListArguments),
+    /// Make the robot know somebody from pictures of them.
+    Enrol(enrolled::PeopleEnrolArguments),
+    /// Give somebody another name.
+    Rename(enrolled::PeopleRenameArguments),
+    /// Write all that is kept of somebody to a folder, for them to take.
+    Export(enrolled::PeopleExportArguments),
+    /// Forget somebody: nothing of them is left in any file.
+    Forget(enrolled::PeopleForgetArguments),
 }
 
 /// Which networks to use.
@@ -105,6 +122,42 @@ pub struct EvalTracksArguments {
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `hachi eval scenes`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "\
+Simulated people walk, cross, leave, come back and change their clothes for two to three minutes a \
+scene. One of them is picked after three seconds; from then on it is measured for how much of the time \
+in view they are followed, how often and how soon they are known again, and for how long somebody else \
+is followed: by the track alone, by FollowMe's calibration, by CARPE-ID, on the same tracks. Scenes: \
+return, crossing, jacket, wardrobe, similar, twin, light, crowd, far, turning.
+
+Example:
+  hachi eval scenes --seed 1 --json")]
+pub struct EvalScenesArguments {
+    /// Which scenes [default: all].
+    #[arg(long, value_name = "NAME", num_args = 1.., value_parser = scene)]
+    pub scenes: Vec<Script>,
+    /// Who plays, in which clothes, and where exactly.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Draw twelve frames of each scene with everybody marked, NAME.png, into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub pictures: Option<PathBuf>,
+    /// The networks.
+    #[command(flatten)]
+    pub networks: NetworkArguments,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn scene(name: &str) -> Result<Script, String> {
+    Script::from_name(name).ok_or_else(|| {
+        let names = Script::ALL.map(Script::name);
+        format!("expected one of {}", names.join(", "))
+    })
 }
 
 /// A distance between features.

@@ -1,6 +1,12 @@
 //! `hachi people`: one module for each of its commands.
 
+mod enrol;
+mod export;
 mod find;
+mod forget;
+mod list;
+mod portrait;
+mod rename;
 mod track;
 
 use crate::cli::people::People;
@@ -12,7 +18,12 @@ use crate::exit::Failure;
 /// What the command could not do, and what the user can.
 pub fn run(command: &People) -> Result<(), Failure> {
     match command {
+        People::Enrol(arguments) => enrol::run(arguments),
+        People::Export(arguments) => export::run(arguments),
         People::Find(arguments) => find::run(arguments),
+        People::Forget(arguments) => forget::run(arguments),
+        People::List(arguments) => list::run(arguments),
+        People::Rename(arguments) => rename::run(arguments),
         People::Track(arguments) => track::run(arguments),
     }
 }

@@ -67,6 +67,8 @@ pub struct Signs {
     pub scan: Mark,
     /// The robot's last new state.
     pub robot: Mark,
+    /// When the emergency stop's node was last well: heard, in operation, its contacts agreeing.
+    pub stop_node: Mark,
     /// The supervisor's last round: the event loop.
     pub event_loop: Mark,
     /// How far the place is to be trusted.

@@ -10,6 +10,7 @@ use hachi_slam::Slam;
 use hachi_unitree::device::{HighClient, MemoryLink, SimulatedRobotConfig, SimulatedService};
 use hachi_world::{LiveLidar, SensorKind, SimulationConfig};
 
+use super::emergency_stop::OpenBus;
 use super::settings::Platform;
 use super::simulator::{MemoryPackets, SimulatorTask, Truth, WalkingBody};
 use super::wiring::{Devices, Running, Service, assemble};
@@ -50,7 +51,23 @@ pub fn connect(
     world: &SimulationConfig,
     clock: &VirtualClock,
     running: Running,
+    kept: (Slam, Option<Recorder>),
+) -> Result<(Service, Truth), Failure> {
+    connect_with(settings, platform, world, clock, running, kept, None)
+}
+
+/// As [`connect`], with an emergency stop's node on a bus.
+///
+/// # Errors
+/// As there.
+pub fn connect_with(
+    settings: &Settings,
+    platform: &Platform,
+    world: &SimulationConfig,
+    clock: &VirtualClock,
+    running: Running,
     (slam, recorder): (Slam, Option<Recorder>),
+    stop_bus: Option<OpenBus>,
 ) -> Result<(Service, Truth), Failure> {
     let link = MemoryLink::new(clock.clone());
     let packets = MemoryPackets::default();
@@ -63,6 +80,7 @@ pub fn connect(
         client,
         packets: packets.clone(),
         sensor: sensor_of(world),
+        stop_bus,
     };
     let tasks = TaskClock::new(clock.clone());
     let mut service = assemble(settings, devices, slam, tasks, running, recorder)?;

@@ -21,6 +21,8 @@ pub struct Supervisor {
     pub signs: SharedSigns,
     /// What is told.
     pub health: Health,
+    /// Whether an emergency stop on a bus is expected.
+    pub has_stop_node: bool,
     /// When it began.
     pub begun: Option<Stamp>,
     /// Whether all was there once, or was waited for.
@@ -33,7 +35,8 @@ impl Work for Supervisor {
         let signs = &self.signs;
         signs.event_loop.set(now);
         let waited = now.nanos_since(begun) > PATIENCE_NS;
-        let all_there = signs.scan.get().is_some() && signs.robot.get().is_some();
+        let stop_there = !self.has_stop_node || signs.stop_node.get().is_some();
+        let all_there = signs.scan.get().is_some() && signs.robot.get().is_some() && stop_there;
         if !self.started && (all_there || waited) {
             self.started = true;
             self.health.started();
@@ -44,6 +47,8 @@ impl Work for Supervisor {
         };
         self.tell(Trouble::LidarLost, lost(&signs.scan));
         self.tell(Trouble::RobotLost, lost(&signs.robot));
+        let stop_lost = self.has_stop_node && lost(&signs.stop_node);
+        self.tell(Trouble::EmergencyStopLost, stop_lost);
         let poor = !matches!(signs.condition.get(), "OK" | "UNKNOWN");
         self.tell(Trouble::LocalisationPoor, poor);
         let full = signs.store_fails.load(Ordering::Relaxed)

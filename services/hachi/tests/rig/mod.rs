@@ -184,6 +184,10 @@ pub struct Rig {
 
 impl Rig {
     pub fn new(platform: &'static str) -> Self {
+        Self::in_world(platform, "office")
+    }
+
+    pub fn in_world(platform: &'static str, world: &str) -> Self {
         let lidar_port = {
             let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
             socket.local_addr().unwrap().port()
@@ -195,6 +199,7 @@ impl Rig {
         let cable = Cable::to(SocketAddr::from(([127, 0, 0, 1], lidar_port)));
         let mut simulate = hachi();
         simulate.args(["simulate", "--trace", "--platform", platform]);
+        simulate.args(["--world", world]);
         simulate.args([
             "--robot",
             "127.0.0.1:0",

@@ -124,6 +124,11 @@ impl Detector {
         self.person
     }
 
+    /// What was in the last image.
+    pub fn found(&self) -> &[Found] {
+        &self.found
+    }
+
     /// What is in the image, surest first.
     ///
     /// # Errors

@@ -5,6 +5,10 @@
 //! `d(x) = sqrt(1/D sum(((x_i - mu_i) / sigma_i)^2))` and the threshold `lambda = mu_d + 2 sigma_d`,
 //! which is never less than one deviation, for FollowMe's calibrated models either.
 
+mod statistics;
+
+pub use statistics::{MOST_NUMBERS, NotAModel, Statistics};
+
 use crate::gallery::is_feature;
 
 /// Averages forget what is older than so many updates (about ten seconds of a camera).

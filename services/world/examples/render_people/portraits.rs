@@ -87,19 +87,13 @@ fn portrait(
     config.base_from_depth = looking_ahead([0.3, 0.0, over_base], random.random_range(0.0..0.35));
     config.light = light(random);
     config.luma_sigma = random.random_range(1.0..4.0);
-    config.geometry.depth = Intrinsics {
-        width: 2,
-        height: 2,
-        centre: [0.5, 0.5],
-        ..config.geometry.depth
-    };
     let map_from_camera = simulation.map_from_base(simulation.start) * config.base_from_depth;
     let Some(window) = window(&config.geometry.color, &map_from_camera, place, height_m) else {
         return Ok(());
     };
     config.geometry.color = window;
     let mut camera = SimulatedCamera::new(simulation, config);
-    let Some(frame) = camera.next_frame() else {
+    let Some(frame) = camera.next_color_frame() else {
         return Ok(());
     };
     let id = frame.people.first().map_or(0, |truth| truth.id);

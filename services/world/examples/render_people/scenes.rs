@@ -11,7 +11,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-use hachi_hal::{Intrinsics, Pose, Stamp, Vector3};
+use hachi_hal::{Pose, Stamp, Vector3};
 use hachi_world::camera::looking_ahead;
 use hachi_world::{
     CameraConfig, Person, Preset, SimulatedCamera, SimulationConfig, Trajectory, Visit,
@@ -110,7 +110,7 @@ fn render_building(seed: u64, files: &mut Files) -> std::io::Result<()> {
 fn write(camera: &mut SimulatedCamera, files: &mut Files) -> std::io::Result<()> {
     let stamp = camera.next_stamp();
     let map_from_depth = camera.map_from_depth(stamp.unwrap_or(Stamp::from_nanos(0)));
-    let Some(frame) = camera.next_frame() else {
+    let Some(frame) = camera.next_color_frame() else {
         return Ok(());
     };
     files.color.write_all(&frame.color)?;
@@ -154,15 +154,8 @@ fn mount(random: &mut ChaCha8Rng) -> Mount {
     }
 }
 
-/// In colour alone: the depth picture is as small as it can be.
 fn camera(mount: &Mount, random: &mut ChaCha8Rng) -> CameraConfig {
     let mut config = CameraConfig::d455(WIDTH, HEIGHT, 0.0);
-    config.geometry.depth = Intrinsics {
-        width: 2,
-        height: 2,
-        centre: [0.5, 0.5],
-        ..config.geometry.depth
-    };
     config.light = light(random);
     config.luma_sigma = random.random_range(1.0..4.0);
     config.base_from_depth = mount.base_from_depth;

@@ -186,14 +186,23 @@ impl SimulatedCamera {
 
     /// The next frame; `None` after the end of the simulation.
     pub fn next_frame(&mut self) -> Option<&CameraFrame> {
+        self.next_of(true)
+    }
+
+    /// The next frame without its depth, which takes most of the time: that picture stays as it was.
+    pub fn next_color_frame(&mut self) -> Option<&CameraFrame> {
+        self.next_of(false)
+    }
+
+    fn next_of(&mut self, with_depth: bool) -> Option<&CameraFrame> {
         let stamp = self.next_stamp()?;
-        self.expose(stamp);
+        self.expose(stamp, with_depth);
         self.frame.sequence = self.next;
         self.next = self.next.saturating_add(1);
         Some(&self.frame)
     }
 
-    fn expose(&mut self, stamp: Stamp) {
+    fn expose(&mut self, stamp: Stamp, with_depth: bool) {
         let time_s = stamp.secs_since(self.start);
         let floor = self.scene.floor();
         self.bodies.clear();
@@ -218,12 +227,14 @@ impl SimulatedCamera {
         };
         let frame = &mut self.frame;
         frame.stamp = stamp;
-        view.depth(
-            &self.config,
-            &self.depth_lens,
-            &map_from_depth,
-            &mut frame.depth,
-        );
+        if with_depth {
+            view.depth(
+                &self.config,
+                &self.depth_lens,
+                &map_from_depth,
+                &mut frame.depth,
+            );
+        }
         let (color, masks) = (&mut frame.color, &mut frame.masks);
         view.color(
             &self.config,

@@ -2,18 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use hachi_people::appearance::{Appearance, Person};
+use hachi_people::gallery;
 use hachi_people::observe::{Observation, Observer};
-use hachi_people::{BoundingBox, gallery};
 use serde::Serialize;
 
+use super::portrait::{self, Meant};
 use crate::cli::people::PeopleFindArguments;
 use crate::exit::Failure;
-use crate::images::{self, Frame, Rgb};
+use crate::images::{self, Frame};
 use crate::{networks, output, progress};
-
-/// A picture at least this much higher than wide is a crop of a person.
-const CROP_RATIO: f64 = 1.4;
 
 #[derive(Debug, Serialize)]
 struct Summary {
@@ -53,17 +50,13 @@ pub fn run(arguments: &PeopleFindArguments) -> Result<(), Failure> {
         }],
     };
     let mut observer = networks::observer(&arguments.networks)?;
-    let appearance = observer.appearance().ok_or_else(|| {
-        Failure::new(
-            "there is no network that tells people apart",
-            "name one with --reid",
-        )
-    })?;
+    let appearance = observer.appearance().ok_or_else(networks::no_appearance)?;
     let usual = appearance.same_person_distance();
     let max_distance = arguments.max_distance.unwrap_or(usual);
     let mut looks = Vec::new();
     for query in queries {
-        looks.extend(look(&mut observer, query)?);
+        let portrait = portrait::read(&mut observer, query, Meant::Largest);
+        looks.extend(portrait.map_err(|reason| unusable(query, reason))?.feature);
     }
     let bar = progress::bar(Some(frames.len() as u64), "frames");
     let mut sightings = Vec::new();
@@ -109,41 +102,6 @@ fn unusable(path: &Path, reason: impl std::fmt::Display) -> Failure {
         format_args!("{}: {reason}", path.display()),
         "give a JPEG or PNG picture of the person",
     )
-}
-
-/// The feature of the person in a picture.
-fn look(observer: &mut Observer, path: &Path) -> Result<Vec<f32>, Failure> {
-    let image = images::read(path).map_err(|reason| unusable(path, reason))?;
-    let view = image.view().map_err(|error| unusable(path, error))?;
-    let (width, height) = (image.width as f64, image.height as f64);
-    if height >= CROP_RATIO * width {
-        let appearance = observer.appearance();
-        let appearance = appearance.ok_or_else(|| unusable(path, "no network for it"))?;
-        return whole(appearance, &image).map_err(|reason| unusable(path, reason));
-    }
-    let seen = observer
-        .observe(&view)
-        .map_err(|error| unusable(path, error))?;
-    let features = |index: usize| seen.features.and_then(|features| features.get(index));
-    let people = (0..seen.detections.len()).filter_map(|index| {
-        let area = seen.detections[index].bounding_box.area();
-        Some((area, features(index)?))
-    });
-    let largest = people.max_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, feature) = largest.ok_or_else(|| unusable(path, "nobody is in it"))?;
-    Ok(feature.to_vec())
-}
-
-fn whole(appearance: &mut Appearance, image: &Rgb) -> Result<Vec<f32>, String> {
-    let view = image.view().map_err(|error| error.to_string())?;
-    let person = Person {
-        bounding_box: BoundingBox::new(0.0, 0.0, image.width as f64, image.height as f64),
-        mask: None,
-    };
-    let features = appearance.features(&view, &[person]);
-    features
-        .map(<[f32]>::to_vec)
-        .map_err(|error| error.to_string())
 }
 
 fn search(observer: &mut Observer, looks: &[f32], frame: &Frame, max_distance: f64) -> Sighting {

@@ -1,0 +1,240 @@
+//! Pictures of what was known of the people in a frame: boxes, masks, numbers, the person who is
+//! followed; and contact sheets of many.
+//!
+//! In: an image, tracks, where enrolled people are, masks. Out: RGB pixels, PNG files.
+
+mod canvas;
+mod font;
+
+use std::path::Path;
+
+use hachi_bridge::AtomicFile;
+use hachi_inference::ImageView;
+use hachi_people::detect::Found;
+use hachi_people::identify::Status;
+use hachi_people::track::Track;
+
+use crate::exit::Failure;
+use crate::images::Rgb;
+use canvas::{Canvas, Color};
+
+/// What is drawn into a picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Labels<'a> {
+    /// Everyone who is followed.
+    pub tracks: &'a [Track],
+    /// Where enrolled people are.
+    pub statuses: &'a [Status],
+    /// What the detector found, in the order of the detections that tracks speak of.
+    pub found: &'a [Found],
+    /// Written in a corner.
+    pub caption: &'a str,
+}
+
+/// Colours of tracks, one after the other; neighbours in number are easily told apart.
+const TRACKS: [Color; 8] = [
+    [86, 180, 233],
+    [230, 159, 0],
+    [0, 158, 115],
+    [204, 121, 167],
+    [240, 228, 66],
+    [0, 114, 178],
+    [213, 94, 0],
+    [170, 170, 170],
+];
+/// Of enrolled people.
+const ENROLLED: Color = [255, 40, 40];
+const WHITE: Color = [255; 3];
+
+/// The picture with everybody marked: those who are enrolled in red with their condition, the others by
+/// the numbers of their tracks.
+pub fn annotate(image: &ImageView<'_>, labels: &Labels<'_>) -> Rgb {
+    let mut canvas = Canvas::of(image);
+    let seen = labels
+        .tracks
+        .iter()
+        .filter(|track| track.is_confirmed() && track.is_seen());
+    let mut later = Vec::new();
+    for track in seen {
+        let person = labels
+            .statuses
+            .iter()
+            .find(|status| status.unseen_s == 0.0 && status.track == Some(track.id));
+        let color = match person {
+            Some(_) => ENROLLED,
+            None => TRACKS[track.id as usize % TRACKS.len()],
+        };
+        let found = track.detection.and_then(|index| labels.found.get(index));
+        if let Some((found, mask)) = found.and_then(|found| Some((found, found.mask.as_ref()?))) {
+            canvas.tint(&found.bounding_box, color, |at| mask.covers(at));
+        }
+        later.push((track, person, color));
+    }
+    // Enrolled people last, over everybody else.
+    later.sort_by_key(|(_, person, _)| person.is_some());
+    for (track, person, color) in later {
+        let b = track.bounding_box();
+        canvas.frame(&b, color, if person.is_some() { 2 } else { 1 });
+        let label = match person {
+            Some(status) => format!("P{} {}", status.person.0, status.condition.name()),
+            None => track.id.to_string(),
+        };
+        canvas.label([b.left, b.top], &label, color);
+    }
+    canvas.label([0.0, 0.0], labels.caption, WHITE);
+    canvas.done()
+}
+
+/// Many pictures in one.
+#[derive(Debug, Clone)]
+pub struct ContactSheet {
+    columns: usize,
+    pictures: Vec<Rgb>,
+}
+
+/// Pixels between two pictures.
+const GAP: usize = 4;
+
+impl ContactSheet {
+    /// An empty one with so many pictures in a row.
+    pub fn new(columns: usize) -> Self {
+        Self {
+            columns: columns.max(1),
+            pictures: Vec::new(),
+        }
+    }
+
+    /// Adds a picture.
+    pub fn push(&mut self, picture: Rgb) {
+        self.pictures.push(picture);
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.pictures.is_empty()
+    }
+
+    /// All of them, row by row, each in a cell as large as the largest.
+    pub fn picture(&self) -> Rgb {
+        let width = self.pictures.iter().map(|p| p.width).max().unwrap_or(1);
+        let height = self.pictures.iter().map(|p| p.height).max().unwrap_or(1);
+        let columns = self.columns.min(self.pictures.len()).max(1);
+        let rows = self.pictures.len().div_ceil(columns).max(1);
+        let size = [columns * (width + GAP) - GAP, rows * (height + GAP) - GAP];
+        let mut sheet = Canvas::blank(size, WHITE);
+        for (index, picture) in self.pictures.iter().enumerate() {
+            let at = [
+                index % columns * (width + GAP),
+                index / columns * (height + GAP),
+            ];
+            sheet.paste(picture, at);
+        }
+        sheet.done()
+    }
+
+    /// Writes all of them to a PNG file.
+    ///
+    /// # Errors
+    /// It can't be written.
+    pub fn write(&self, path: &Path) -> Result<(), Failure> {
+        write_png(path, &self.picture())
+    }
+}
+
+/// Writes a picture to a PNG file.
+///
+/// # Errors
+/// It can't be written.
+pub fn write_png(path: &Path, picture: &Rgb) -> Result<(), Failure> {
+    let mut file = AtomicFile::create(path).map_err(|error| Failure::unwritten(&error))?;
+    let bytes = png_bytes(picture).map_err(|error| Failure::new(error, "please report this"))?;
+    file.write(&bytes)
+        .map_err(|error| Failure::unwritten(&error))?;
+    file.commit().map_err(|error| Failure::unwritten(&error))
+}
+
+fn png_bytes(picture: &Rgb) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let [width, height] = [picture.width, picture.height].map(|n| u32::try_from(n).unwrap_or(0));
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::High);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&picture.pixels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hachi_people::BoundingBox;
+    use hachi_people::identify::{AppearanceModel, Identifier, IdentifierConfig};
+    use hachi_people::track::{Detection, Frame, Tracker, TrackerConfig};
+
+    fn pixel(picture: &Rgb, x: usize, y: usize) -> [u8; 3] {
+        let at = 3 * (y * picture.width + x);
+        picture.pixels[at..at + 3].try_into().unwrap()
+    }
+
+    #[test]
+    fn boxes_have_their_track_s_colour_and_the_enrolled_person_s_is_red() {
+        let mut tracker = Tracker::new(TrackerConfig::default());
+        let detections = [20.0, 60.0].map(|left| Detection {
+            bounding_box: BoundingBox::new(left, 30.0, 20.0, 50.0),
+            score: 0.95,
+        });
+        for _ in 0..4 {
+            tracker.step(&Frame {
+                dt_s: 0.1,
+                detections: &detections,
+                features: None,
+            });
+        }
+        let tracks = tracker.tracks();
+        let mut identifier = Identifier::new(IdentifierConfig::default());
+        let model = AppearanceModel::first(&[1.0, 0.0]).unwrap();
+        identifier.enrol(model, Some(tracks[1].id));
+        identifier.step(tracks, None, 0.1);
+        let statuses: Vec<_> = identifier.statuses().copied().collect();
+        let grey = vec![100; 3 * 100 * 100];
+        let image = ImageView::new(100, 100, &grey).unwrap();
+        let picture = annotate(
+            &image,
+            &Labels {
+                tracks,
+                statuses: &statuses,
+                found: &[],
+                caption: "",
+            },
+        );
+        // The lower left corners of both boxes, a place between them, a place inside.
+        assert_eq!(pixel(&picture, 20, 79), TRACKS[tracks[0].id as usize]);
+        assert_eq!(pixel(&picture, 60, 79), ENROLLED);
+        assert_eq!(pixel(&picture, 50, 79), [100; 3]);
+        assert_eq!(pixel(&picture, 30, 60), [100; 3]);
+    }
+
+    #[test]
+    fn a_sheet_holds_its_pictures_row_by_row() {
+        let mut sheet = ContactSheet::new(2);
+        for shade in [10, 20, 30] {
+            sheet.push(Rgb {
+                width: 4,
+                height: 2,
+                pixels: vec![shade; 24],
+            });
+        }
+        let picture = sheet.picture();
+        assert_eq!((picture.width, picture.height), (8 + GAP, 4 + GAP));
+        assert_eq!(pixel(&picture, 0, 0), [10; 3]);
+        assert_eq!(pixel(&picture, 4 + GAP, 1), [20; 3]);
+        assert_eq!(pixel(&picture, 3, 2 + GAP), [30; 3]);
+        assert_eq!(pixel(&picture, 4 + GAP, 2 + GAP), WHITE);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sheet.png");
+        sheet.write(&path).unwrap();
+        assert_eq!(crate::images::read(&path).unwrap(), picture);
+    }
+}
