@@ -239,6 +239,12 @@ fn frames_go_over_the_kernels_virtual_bus() {
     assert_eq!(second.frame, request);
     assert!((0..5_000 * MS).contains(&second.age_ns));
     assert_eq!(there.receive(Duration::from_millis(5)).unwrap(), None);
+    // Who has no time does not wait, and gets what is there.
+    assert_eq!(there.receive(Duration::ZERO).unwrap(), None);
+    here.send(&frame).unwrap();
+    let at_once = there.receive(Duration::ZERO).unwrap();
+    assert_eq!(at_once.unwrap().frame, frame);
+    assert_eq!(there.receive(Duration::from_millis(5)).unwrap(), None);
 
     // A socket for a stop's frames alone sees nothing else, however much there is.
     let config = StopNodeConfig::default();

@@ -9,6 +9,7 @@ const TESTS: &[&str] = &[
     include_str!("gate.rs"),
     include_str!("../../hachi/tests/service.rs"),
     include_str!("../../hachi/tests/process.rs"),
+    include_str!("../../hachi/tests/emergency_stop.rs"),
 ];
 
 fn rows() -> Vec<Vec<&'static str>> {

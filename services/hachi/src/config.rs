@@ -15,7 +15,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
 use crate::service::settings::{
-    CameraConfig, LidarConfig, PeopleConfig, RobotConfig, RowConfig, ServiceConfig,
+    CameraConfig, EmergencyStopConfig, LidarConfig, PeopleConfig, RobotConfig, RowConfig,
+    ServiceConfig,
 };
 
 /// What is known of the motion besides the scans.
@@ -122,6 +123,8 @@ pub struct Settings {
     pub camera: CameraConfig,
     /// People in its sight.
     pub people: PeopleConfig,
+    /// An emergency stop besides the remote control's.
+    pub emergency_stop: EmergencyStopConfig,
     /// Limits of the gate.
     pub safety: SafetyConfig,
     /// Where it goes.

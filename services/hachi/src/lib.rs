@@ -16,6 +16,7 @@
 //! | [`record`] | what a run has done so far |
 //! | [`service`] | the service on a robot, task by task |
 //! | [`config`] | settings |
+//! | [`can`] | CAN interfaces of this machine |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
 //! | [`images`] | folders of images |
 //! | [`networks`] | which networks find people and tell them apart |
@@ -28,6 +29,7 @@
 //! | [`results`] | the files of a run |
 //! | [`saved_maps`], [`saved_people`] | saved maps, and the people the robot knows, as the commands open them |
 
+pub mod can;
 pub mod cli;
 pub mod commands;
 pub mod config;

@@ -59,6 +59,8 @@ pub enum Trouble {
     RobotLost,
     /// The LiDAR sends nothing.
     LidarLost,
+    /// The emergency stop's node says nothing, or that it does not work.
+    EmergencyStopLost,
     /// The camera sends nothing.
     CameraLost,
     /// The map can't be kept.
@@ -77,9 +79,10 @@ pub enum Trouble {
 
 impl Trouble {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::RobotLost,
         Self::LidarLost,
+        Self::EmergencyStopLost,
         Self::CameraLost,
         Self::DiskFull,
         Self::ModelMissing,
@@ -94,6 +97,7 @@ impl Trouble {
         match self {
             Self::RobotLost => "robot lost",
             Self::LidarLost => "lidar lost",
+            Self::EmergencyStopLost => "emergency stop lost",
             Self::CameraLost => "camera lost",
             Self::DiskFull => "disk full",
             Self::ModelMissing => "model missing",
@@ -107,7 +111,9 @@ impl Trouble {
     /// The state that it puts the service in.
     const fn state(self) -> HealthState {
         match self {
-            Self::RobotLost | Self::LidarLost | Self::CameraLost => HealthState::SensorLost,
+            Self::RobotLost | Self::LidarLost | Self::EmergencyStopLost | Self::CameraLost => {
+                HealthState::SensorLost
+            }
             Self::DiskFull => HealthState::DiskFull,
             Self::ModelMissing => HealthState::ModelMissing,
             Self::TaskDegraded | Self::LocalisationPoor | Self::TaskDied | Self::Settings => {

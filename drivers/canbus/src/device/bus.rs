@@ -32,6 +32,16 @@ pub trait CanBus {
     fn receive(&mut self, limit: Duration) -> Result<Option<Received>, BusError>;
 }
 
+impl<B: CanBus + ?Sized> CanBus for std::boxed::Box<B> {
+    fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
+        (**self).send(frame)
+    }
+
+    fn receive(&mut self, limit: Duration) -> Result<Option<Received>, BusError> {
+        (**self).receive(limit)
+    }
+}
+
 /// What is wrong with a bus, and what to do about it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

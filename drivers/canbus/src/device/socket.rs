@@ -22,6 +22,7 @@ const SAME_ID: u32 = 0x8000_07FF;
 #[derive(Debug)]
 pub struct SocketCan {
     socket: CanSocket,
+    blocking: bool,
     foreign: u64,
 }
 
@@ -38,7 +39,11 @@ impl SocketCan {
         let socket = CanSocket::open(interface).map_err(failed)?;
         socket.set_recv_timestamp(true).map_err(failed)?;
         socket.set_write_timeout(SEND_LIMIT).map_err(failed)?;
-        Ok(Self { socket, foreign: 0 })
+        Ok(Self {
+            socket,
+            blocking: true,
+            foreign: 0,
+        })
     }
 
     /// Opens an interface for frames under these identifiers alone: the kernel leaves out the others,
@@ -56,6 +61,16 @@ impl SocketCan {
         };
         opened.socket.set_filters(&filters).map_err(failed)?;
         Ok(opened)
+    }
+
+    /// Whether reading waits: who has no time is told at once that there is nothing.
+    fn set_blocking(&mut self, blocking: bool) -> Result<(), BusError> {
+        if self.blocking != blocking {
+            let set = self.socket.set_nonblocking(!blocking);
+            set.map_err(BusError::Down)?;
+            self.blocking = blocking;
+        }
+        Ok(())
     }
 
     /// Frames left out because they have identifiers of 29 bits or report errors.
@@ -91,8 +106,11 @@ impl CanBus for SocketCan {
         let end = Instant::now() + limit.min(Duration::from_secs(3_600));
         loop {
             let left = end.saturating_duration_since(Instant::now());
-            let wait = left.max(SHORTEST);
-            self.socket.set_read_timeout(wait).map_err(BusError::Down)?;
+            self.set_blocking(!left.is_zero())?;
+            if !left.is_zero() {
+                let wait = left.max(SHORTEST);
+                self.socket.set_read_timeout(wait).map_err(BusError::Down)?;
+            }
             match self.socket.read_frame_with_timestamp() {
                 Ok((frame, taken_in)) => match standard(&frame) {
                     Some(frame) => {

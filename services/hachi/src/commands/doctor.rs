@@ -7,6 +7,7 @@
 #[cfg(all(target_os = "linux", target_pointer_width = "64"))]
 mod cameras;
 mod devices;
+mod emergency_stop;
 mod files;
 mod finding;
 mod machine;
@@ -54,6 +55,7 @@ impl Examination {
             realtime::check(),
             network::check(),
             devices::check(),
+            emergency_stop::check(),
             #[cfg(all(target_os = "linux", target_pointer_width = "64"))]
             cameras::check(),
             files::check(),

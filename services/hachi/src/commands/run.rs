@@ -24,11 +24,13 @@ use tracing::{error, info, warn};
 
 use super::replay::slam;
 use super::simulate::platform_of;
+use crate::can;
 use crate::cli::service::{RecordArguments, RunArguments};
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::recorder::Recorder;
+use crate::service::emergency_stop::OpenBus;
 use crate::service::eyes;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
@@ -74,6 +76,7 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
             LidarKind::Helios16p => Sensor::Robosense,
         },
         eyes: eyes::of_this_computer(&settings, clock),
+        stop_bus: stop_bus(&settings)?,
     };
     let listen = settings.service.listen;
     let listener = web::listen(listen)
@@ -237,6 +240,25 @@ fn stop_line(platform: &Platform, address: SocketAddr) -> Result<StopLine, Failu
         commander.level,
     )
     .map_err(|error: io::Error| unopened("the second line to the robot", &error, "robot.address"))
+}
+
+/// The bus of the emergency stop's node, where the settings name one. It is opened here once: a name
+/// that is wrong is better known at the start than while the robot stands and nobody knows why.
+fn stop_bus(settings: &Settings) -> Result<Option<OpenBus>, Failure> {
+    let Some((interface, node)) = settings.emergency_stop.node() else {
+        return Ok(None);
+    };
+    let (interface, ids) = (interface.to_owned(), node.ids());
+    let mut opened = Some(can::open(&interface, &ids).map_err(|error| {
+        Failure::new(
+            error,
+            "correct emergency_stop.can, or take it out where there is no such stop",
+        )
+    })?);
+    Ok(Some(Box::new(move || match opened.take() {
+        Some(bus) => Ok(bus),
+        None => can::open(&interface, &ids),
+    })))
 }
 
 fn udp_of(settings: &Settings) -> UdpConfig {

@@ -107,11 +107,16 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
 /// # Errors
 /// There is none that can be driven.
 pub fn platform_of(name: &str) -> Result<Platform, Failure> {
-    Platform::of_name(name).ok_or_else(|| {
-        Failure::new(
+    Platform::of_name(name).ok_or_else(|| match name {
+        // It takes velocities as ROS twists, and sends the speeds of its wheels there.
+        "kairos" => Failure::new(
+            "a kairos is driven over ROS 2, which hachi does not speak yet",
+            "choose b1 or go1, or map its recordings with hachi replay --platform kairos",
+        ),
+        _ => Failure::new(
             format_args!("no robot {name:?} can be driven"),
             "choose b1 or go1",
-        )
+        ),
     })
 }
 

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use hachi_behaviour::{Cause, Causes, GuardedBase, Obstacles, PlaceEstimate, Sight, Verdict};
-use hachi_hal::{BaseCommand, Stamp, Watchdog};
+use hachi_hal::{BaseCommand, Stamp, StopSample, Watchdog};
 use hachi_runtime::{Halt, Progress, Receiver, Sender, SoftWatchdog, Work};
 use hachi_unitree::BodySample;
 use hachi_unitree::device::RobotLink;
@@ -25,6 +25,12 @@ pub struct BaseCommandTask<L> {
     pub wishes: Receiver<BaseCommand>,
     /// The last of them.
     pub wish: Option<BaseCommand>,
+    /// The emergency stop on a bus, where there is one.
+    pub stop_node: Option<Receiver<StopSample>>,
+    /// What was last heard of it.
+    pub node_stop: Option<StopSample>,
+    /// What was last heard of the remote control's.
+    pub remote_stop: Option<StopSample>,
     /// Where the robot is.
     pub places: Receiver<PlaceEstimate>,
     /// What stands around.
@@ -86,7 +92,7 @@ impl<L: RobotLink> BaseCommandTask<L> {
                 Ok(Some(report)) => {
                     self.sight.robot = Some(report.stamp);
                     self.signs.robot.set(report.stamp);
-                    self.sight.emergency_stop = report.stop.or(self.sight.emergency_stop);
+                    self.remote_stop = report.stop.or(self.remote_stop);
                     if let Some(battery) = report.battery {
                         let percent = (100.0 * battery.charge).round() as u32;
                         self.signs.battery_percent.store(percent, Ordering::Relaxed);
@@ -111,6 +117,13 @@ impl<L: RobotLink> BaseCommandTask<L> {
         if let Some(place) = self.places.newest() {
             self.sight.localisation = Some((place.stamp, place.trusted));
         }
+        self.sight.emergency_stop = match &self.stop_node {
+            None => self.remote_stop,
+            Some(samples) => {
+                self.node_stop = samples.newest().or(self.node_stop);
+                either(self.remote_stop, self.node_stop)
+            }
+        };
         self.obstacles = self.around.newest().or(self.obstacles);
         self.wish = self.wishes.newest().or(self.wish);
         self.sight.camera = self.signs.camera.get();
@@ -134,5 +147,37 @@ impl<L: RobotLink> BaseCommandTask<L> {
             info!("going on");
         }
         self.said = verdict.causes;
+    }
+}
+
+/// Two stops as one: pressed if either is, as old as the older one, unheard while either is.
+fn either(one: Option<StopSample>, other: Option<StopSample>) -> Option<StopSample> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(StopSample {
+            stamp: one.stamp.min(other.stamp),
+            pressed: one.pressed || other.pressed,
+        }),
+        (one, other) => one.or(other).filter(|heard| heard.pressed),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn either_stop_stops_and_both_must_be_heard() {
+        let stop = |nanos, pressed| {
+            Some(StopSample {
+                stamp: Stamp::from_nanos(nanos),
+                pressed,
+            })
+        };
+        assert_eq!(either(stop(5, false), stop(3, false)), stop(3, false));
+        assert_eq!(either(stop(5, true), stop(3, false)), stop(3, true));
+        assert_eq!(either(stop(5, false), stop(9, true)), stop(5, true));
+        assert_eq!(either(None, stop(9, true)), stop(9, true));
+        assert_eq!(either(stop(9, false), None), None);
+        assert_eq!(either(None, None), None);
     }
 }

@@ -8,6 +8,7 @@
 //! | module | task | released by |
 //! |---|---|---|
 //! | [`base`] | `base command`: hears the robot, asks the gate, tells the robot | 5 ms |
+//! | [`emergency_stop`] | `emergency stop`: a stop's node on a CAN bus, for the gate; where there is one | 5 ms |
 //! | [`lidar`] | `lidar receive`: packets to scans | 4 ms |
 //! | [`legs`] | `legs`: footprint and leg odometry | a state of the robot |
 //! | [`filter`] | `filter`: obstacles first, then which points are kept | a scan |
@@ -30,6 +31,7 @@ pub mod body;
 pub mod camera;
 pub mod crew;
 pub mod detection;
+pub mod emergency_stop;
 pub mod eyes;
 pub mod filter;
 pub mod legs;

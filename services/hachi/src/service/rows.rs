@@ -63,6 +63,9 @@ const fn with_ladder(spec: TaskSpec, ladder: &'static [&'static str]) -> TaskSpe
 /// The command that reaches the robot. A robot that hears nothing for 10 ms stumbles.
 pub const BASE_COMMAND: TaskSpec = hard(row("base command", every(5), 2_000, 90), Overrun::Stop);
 
+/// A stop's node on a bus.
+pub const EMERGENCY_STOP: TaskSpec = hard(row("emergency stop", every(5), 500, 85), Overrun::Skip);
+
 /// Packets to scans.
 pub const LIDAR_RECEIVE: TaskSpec = hard(row("lidar receive", every(4), 1_500, 80), Overrun::Skip);
 
@@ -123,8 +126,9 @@ pub const DETECTION: TaskSpec = with_ladder(
 pub const RECORDER: TaskSpec = row("recorder", every(50), 20_000, 10);
 
 /// The tasks of a service, in the order of the table.
-pub const ALL: [TaskSpec; 12] = [
+pub const ALL: [TaskSpec; 13] = [
     BASE_COMMAND,
+    EMERGENCY_STOP,
     LIDAR_RECEIVE,
     LEGS,
     SUPERVISOR,

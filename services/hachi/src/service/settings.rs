@@ -4,6 +4,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
 use hachi_b1::B1;
+use hachi_canbus::stop_node::{NODES, StopNodeConfig};
 use hachi_go1::GO1;
 use hachi_people::identify::IdentifierConfig;
 use hachi_runtime::{Overrun, TaskSpec, Trigger};
@@ -118,6 +119,80 @@ pub struct PeopleConfig {
     pub identify: IdentifierConfig,
 }
 
+/// An emergency stop of its own on a CAN bus, besides the remote control's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EmergencyStopConfig {
+    /// The interface that its node is on; there is none if unset.
+    pub can: Option<String>,
+    /// The node's number.
+    pub node: u8,
+    /// The inputs that its contacts are wired to, counted from 1.
+    pub inputs: Vec<u8>,
+    /// Silence of the node after which it is taken for pressed, s.
+    pub heartbeat_stale_s: f64,
+}
+
+impl Default for EmergencyStopConfig {
+    fn default() -> Self {
+        let usual = StopNodeConfig::default();
+        let wired = |input: &u8| usual.closed_inputs & (1 << (input - 1)) != 0;
+        Self {
+            can: None,
+            node: usual.node,
+            inputs: INPUTS.filter(wired).collect(),
+            heartbeat_stale_s: usual.heartbeat_limit_ns as f64 * 1e-9,
+        }
+    }
+}
+
+/// The inputs of a node that a stop can be wired to.
+const INPUTS: std::ops::RangeInclusive<u8> = 1..=8;
+
+impl EmergencyStopConfig {
+    /// The interface and the node, where there is one.
+    pub fn node(&self) -> Option<(&str, StopNodeConfig)> {
+        let inputs = self.inputs.iter().filter(|input| INPUTS.contains(input));
+        let config = StopNodeConfig {
+            node: self.node,
+            closed_inputs: inputs.fold(0, |bits, input| bits | 1 << (input - 1)),
+            heartbeat_limit_ns: (self.heartbeat_stale_s * 1e9) as i64,
+        };
+        self.can.as_deref().map(|can| (can, config))
+    }
+
+    fn check(&self) -> Result<(), Unworkable> {
+        let unworkable = |key: &str, what: String, next_step: &str| Unworkable {
+            key: format!("emergency_stop.{key}"),
+            what: format!("{what} can't work"),
+            next_step: next_step.to_owned(),
+        };
+        // Linux names no interface in more bytes, or with a slash.
+        let named = |can: &String| (1..=15).contains(&can.len()) && !can.contains('/');
+        if let Some(can) = self.can.as_ref().filter(|can| !named(can)) {
+            let next_step = "name an interface that `ip link show type can` lists, as \"can0\"";
+            return Err(unworkable("can", format!("{can:?}"), next_step));
+        }
+        if !NODES.contains(&self.node) {
+            return Err(unworkable("node", self.node.to_string(), "give 1 to 127"));
+        }
+        if self.inputs.is_empty() || !self.inputs.iter().all(|input| INPUTS.contains(input)) {
+            let next_step = "name those of the inputs 1 to 8 that the contacts are wired to";
+            return Err(unworkable(
+                "inputs",
+                format!("{:?}", self.inputs),
+                next_step,
+            ));
+        }
+        if !(0.05..=2.0).contains(&self.heartbeat_stale_s) {
+            let next_step = "give 0.05 to 2 s: twice the node's heartbeat and a little";
+            let what = self.heartbeat_stale_s.to_string();
+            return Err(unworkable("heartbeat_stale_s", what, next_step));
+        }
+        Ok(())
+    }
+}
+
 /// The program itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -192,6 +267,7 @@ pub fn row(settings: &Settings, spec: TaskSpec) -> TaskSpec {
 /// # Errors
 /// The first such value.
 pub fn check(settings: &Settings) -> Result<(), Unworkable> {
+    settings.emergency_stop.check()?;
     let unworkable = |key: String, what: String, next_step: &str| Unworkable {
         key,
         what,

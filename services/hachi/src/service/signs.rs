@@ -83,6 +83,8 @@ pub struct Signs {
     pub camera: Mark,
     /// The robot's last new state.
     pub robot: Mark,
+    /// When the emergency stop's node was last well: heard, in operation, its contacts agreeing.
+    pub stop_node: Mark,
     /// The supervisor's last round: the event loop.
     pub event_loop: Mark,
     /// How far the place is to be trusted.
@@ -117,6 +119,7 @@ impl Default for Signs {
             camera: Mark::default(),
             robot: Mark::default(),
             event_loop: Mark::default(),
+            stop_node: Mark::default(),
             condition: Word::of(PLACE_CONDITIONS),
             causes: AtomicU32::default(),
             loops: AtomicU64::default(),

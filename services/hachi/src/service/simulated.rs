@@ -15,6 +15,7 @@ use hachi_unitree::device::{HighClient, MemoryLink, SimulatedRobotConfig, Simula
 use hachi_world::{CameraConfig, LiveLidar, SensorKind, SimulatedCamera, SimulationConfig};
 
 use super::camera::ColorOf;
+use super::emergency_stop::OpenBus;
 use super::settings::Platform;
 use super::simulator::{
     MemoryPackets, SeenPeople, SimulatedEye, SimulatorTask, Truth, WalkingBody,
@@ -45,6 +46,15 @@ pub fn sensor_of(world: &SimulationConfig) -> Sensor {
         SensorKind::Helios16P => Sensor::Robosense,
         _ => Sensor::Velodyne,
     }
+}
+
+/// What not every robot has.
+#[derive(Default)]
+pub struct Besides {
+    /// A camera.
+    pub people: Option<Spectacle>,
+    /// An emergency stop's node on a bus.
+    pub stop_bus: Option<OpenBus>,
 }
 
 /// A camera on the simulated robot, and who sees what it sees.
@@ -95,8 +105,31 @@ pub fn connect(
     world: &SimulationConfig,
     clock: &VirtualClock,
     running: Running,
+    kept: (Slam, Option<Recorder>),
+) -> Result<(Service, Truth), Failure> {
+    connect_with(
+        settings,
+        platform,
+        world,
+        clock,
+        running,
+        kept,
+        Besides::default(),
+    )
+}
+
+/// As [`connect`], with what a robot may have besides.
+///
+/// # Errors
+/// As there.
+pub fn connect_with(
+    settings: &Settings,
+    platform: &Platform,
+    world: &SimulationConfig,
+    clock: &VirtualClock,
+    running: Running,
     (slam, recorder): (Slam, Option<Recorder>),
-    people: Option<Spectacle>,
+    besides: Besides,
 ) -> Result<(Service, Truth), Failure> {
     let link = MemoryLink::new(clock.clone());
     let packets = MemoryPackets::default();
@@ -104,13 +137,14 @@ pub fn connect(
     let robot = platform.robot;
     let client = HighClient::over(robot, platform.client(&settings.robot), link.clone())
         .map_err(|error| Failure::new(error, "please report this"))?;
-    let (eyes, eye) = people.map(|people| people.open(world)).unzip();
+    let (eyes, eye) = besides.people.map(|people| people.open(world)).unzip();
     let devices = Devices {
         eyes,
         platform: *platform,
         client,
         packets: packets.clone(),
         sensor: sensor_of(world),
+        stop_bus: besides.stop_bus,
     };
     let tasks = TaskClock::new(clock.clone());
     let mut service = assemble(settings, devices, slam, tasks, running, recorder)?;

@@ -23,6 +23,8 @@ pub struct Supervisor {
     pub health: Health,
     /// Whether there is to be a camera.
     pub has_camera: bool,
+    /// Whether an emergency stop on a bus is expected.
+    pub has_stop_node: bool,
     /// When it began.
     pub begun: Option<Stamp>,
     /// Whether all was there once, or was waited for.
@@ -35,7 +37,8 @@ impl Work for Supervisor {
         let signs = &self.signs;
         signs.event_loop.set(now);
         let waited = now.nanos_since(begun) > PATIENCE_NS;
-        let all_there = signs.scan.get().is_some() && signs.robot.get().is_some();
+        let stop_there = !self.has_stop_node || signs.stop_node.get().is_some();
+        let all_there = signs.scan.get().is_some() && signs.robot.get().is_some() && stop_there;
         if !self.started && (all_there || waited) {
             self.started = true;
             self.health.started();
@@ -50,6 +53,8 @@ impl Work for Supervisor {
         let no_model = signs.model_missing.load(Ordering::Relaxed)
             || signs.network_fails.load(Ordering::Relaxed);
         self.tell(Trouble::ModelMissing, no_model);
+        let stop_lost = self.has_stop_node && lost(&signs.stop_node);
+        self.tell(Trouble::EmergencyStopLost, stop_lost);
         let poor = !matches!(signs.condition.get(), "OK" | "UNKNOWN");
         self.tell(Trouble::LocalisationPoor, poor);
         let full = signs.store_fails.load(Ordering::Relaxed)

@@ -4,6 +4,7 @@
 //! packets ─ lidar receive ─ filter ─ odometry ─ slam
 //!                             │ obstacles  │ place ↖ correction
 //! states ─ base command ←─────┴── gate ────┤
+//! stop node ─────↗                         │
 //!    │         ↑ wish                      ↓
 //!    └ legs    └──────────────────── behaviour
 //!
@@ -35,6 +36,7 @@ use super::body::UnitreeBody;
 use super::camera::{CameraReceive, PictureSource};
 use super::crew::Crew;
 use super::detection::Detection;
+use super::emergency_stop::{EmergencyStopTask, OpenBus};
 use super::filter::Filter;
 use super::legs::Legs;
 use super::lidar::LidarReceive;
@@ -66,6 +68,8 @@ pub struct Devices<P, L> {
     pub packets: P,
     /// Which sensor sends them.
     pub sensor: Sensor,
+    /// The bus of the emergency stop's node, where the settings name one.
+    pub stop_bus: Option<OpenBus>,
     /// The camera, where there is to be one.
     pub eyes: Option<Eyes>,
 }
@@ -183,12 +187,17 @@ where
     let records = recorder.is_some();
     let (wishes, wishes_end) = bounded("wishes", 4, WhenFull::DropOldest, &nobody);
 
+    let (to_stop, stop_samples) = bounded("emergency stop", 4, WhenFull::DropOldest, &nobody);
+
     let gate = SafetyGate::new(settings.safety);
     let base_command = BaseCommandTask {
         base: GuardedBase::new(gate, UnitreeBody(devices.client)),
         sight: Sight::default(),
         wishes: wishes_end,
         wish: None,
+        stop_node: devices.stop_bus.is_some().then_some(stop_samples),
+        node_stop: None,
+        remote_stop: None,
         places: gate_places,
         around: around_end,
         obstacles: None,
@@ -204,6 +213,25 @@ where
     let spec = row(settings, rows::BASE_COMMAND);
     // Of states only the newest counts: that the others go is no loss, and is not told.
     table.add(spec, bell, vec![], Box::new(base_command));
+
+    let has_stop_node = devices.stop_bus.is_some();
+    if let Some(open) = devices.stop_bus {
+        let (_, config) = settings.emergency_stop.node().unwrap_or_default();
+        let task = EmergencyStopTask {
+            open,
+            config,
+            clock: table.clock().clone(),
+            out: to_stop,
+            signs: Arc::clone(&signs),
+            stop: None,
+            opens_at: None,
+            said: None,
+        };
+        let bell = table.bell();
+        let spec = row(settings, rows::EMERGENCY_STOP);
+        // Of samples only the newest counts: that the others go is no loss, and is not told.
+        table.add(spec, bell, vec![], Box::new(task));
+    }
 
     let packets = Tap {
         source: devices.packets,
@@ -227,6 +255,7 @@ where
         has_camera: devices.eyes.is_some(),
         signs: Arc::clone(&signs),
         health: table.health().clone(),
+        has_stop_node,
         begun: None,
         started: false,
     };

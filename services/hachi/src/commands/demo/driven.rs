@@ -30,7 +30,7 @@ use crate::mapping::Ended;
 use crate::recorder::Recorder;
 use crate::results::Results;
 use crate::service::signs::SharedSigns;
-use crate::service::simulated::{Spectacle, connect, sensor_of};
+use crate::service::simulated::{Besides, Spectacle, connect_with, sensor_of};
 use crate::service::simulator::{SeenPeople, Truth, route};
 use crate::service::web::Status;
 use crate::service::wiring::{Running, Service, Watcher};
@@ -80,14 +80,17 @@ pub fn walk(
     };
     let running = Running::VirtualTime;
     let (spectacle, album) = spectacle(arguments, &world).unzip();
-    let (service, truth) = connect(
+    let (service, truth) = connect_with(
         &settings,
         &platform,
         &world,
         &clock,
         running,
         (slam, recorder),
-        spectacle,
+        Besides {
+            people: spectacle,
+            ..Besides::default()
+        },
     )?;
     let Service {
         table,

@@ -50,9 +50,8 @@ fn writable() -> Finding {
     }
 }
 
-/// Configuration files where hachi and its users keep them, each read and checked to be TOML.
-fn configuration() -> Vec<Finding> {
-    const NAME: &str = "configuration";
+/// Configuration files where hachi and its users keep them.
+pub(super) fn configuration_files() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from("config"), PathBuf::from("/etc/hachi")];
     if let Some(home) = env::var_os("XDG_CONFIG_HOME") {
         folders.push(Path::new(&home).join("hachi"));
@@ -72,6 +71,13 @@ fn configuration() -> Vec<Finding> {
         inside.sort();
         files.extend(inside);
     }
+    files
+}
+
+/// Each configuration file, read and checked to be TOML.
+fn configuration() -> Vec<Finding> {
+    const NAME: &str = "configuration";
+    let files = configuration_files();
     if files.is_empty() {
         return vec![Finding::ok(
             NAME,
