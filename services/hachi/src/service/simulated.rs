@@ -61,6 +61,8 @@ pub struct Besides {
 pub struct Spectacle {
     /// The camera.
     pub camera: CameraConfig,
+    /// Its cable.
+    pub port: SimulatedPort,
     /// The networks, and who watches.
     pub watcher: Watcher,
     /// Who is truly seen.
@@ -78,8 +80,7 @@ impl Spectacle {
             color: format(&geometry.color),
             ..RealSenseConfig::default()
         };
-        let port = SimulatedPort::new(geometry);
-        let driver = RealSense::new(port.clone(), config);
+        let driver = RealSense::new(self.port.clone(), config);
         let pixels = [geometry.depth.pixels(), geometry.color.pixels()];
         let eyes = Eyes {
             camera: Box::new(ColorOf::new(driver, pixels[0], pixels[1])),
@@ -88,7 +89,7 @@ impl Spectacle {
         };
         let eye = SimulatedEye {
             camera: SimulatedCamera::new(world, self.camera),
-            port,
+            port: self.port,
             seen: self.seen,
         };
         (eyes, eye)

@@ -9,6 +9,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use hachi_realsense::device::simulated::SimulatedPort;
 use hachi_runtime::executor::virtual_time::VirtualTime;
 use hachi_runtime::{Health, VirtualClock};
 use hachi_trajectory::Trajectory;
@@ -184,8 +185,10 @@ fn spectacle(
     };
     let seen = SeenPeople::default();
     let (spectator, album) = Spectator::new(seen.clone(), world.start, arguments.seconds);
+    let camera = people::camera();
     let spectacle = Spectacle {
-        camera: people::camera(),
+        port: SimulatedPort::new(camera.geometry),
+        camera,
         watcher: Watcher {
             observer,
             known: Vec::new(),
