@@ -245,9 +245,12 @@ pub struct SimulatedEye {
     pub seen: SeenPeople,
 }
 
+/// A picture's time, and who is in it.
+type Seen = (Stamp, Vec<PersonTruth>);
+
 /// Who the camera truly saw in its last pictures.
 #[derive(Debug, Clone, Default)]
-pub struct SeenPeople(Arc<Mutex<VecDeque<(Stamp, Vec<PersonTruth>)>>>);
+pub struct SeenPeople(Arc<Mutex<VecDeque<Seen>>>);
 
 /// So many are kept: more than wait between camera and tracking.
 const SEEN_KEPT: usize = 16;
@@ -257,7 +260,7 @@ impl SeenPeople {
     /// milliseconds.
     pub fn at(&self, stamp: Stamp) -> Option<Vec<PersonTruth>> {
         let seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let off = |(at, _): &&(Stamp, Vec<PersonTruth>)| at.nanos_since(stamp).abs();
+        let off = |(at, _): &&Seen| at.nanos_since(stamp).abs();
         seen.iter()
             .min_by_key(off)
             .map(|(_, people)| people.clone())
