@@ -156,6 +156,24 @@ fn a_long_corridor_is_held_along_its_axis_with_legs_and_without() {
     }
 }
 
+/// Between open lots a quarter of a turn sees little that would hold the sensor's tilt; bounds on
+/// acceleration made for a trot let it lean there from one scan to the next.
+#[test]
+fn a_robot_on_wheels_in_the_open_does_not_lean() {
+    let world = SimulationConfig::preset(Preset::CampusLong, 2, 25.0);
+    let walk = Walk::run(&world, OdometryConfig::default(), false);
+    assert!(walk.estimates.iter().all(|e| e.condition.is_ok()));
+    let places: Vec<_> = walk.truth.iter().zip(&walk.estimates).collect();
+    let turns = places.windows(2).map(|pair| {
+        let [(before, guessed), (after, found)] = [pair[0], pair[1]];
+        let first = (before, &guessed.odom_from_lidar);
+        error(first, (after, &found.odom_from_lidar)).1
+    });
+    let squares: f64 = turns.map(|turn| turn * turn).sum();
+    let mean = (squares / places.len() as f64).sqrt().to_degrees();
+    assert!(mean < 0.35, "{mean} degrees from scan to scan");
+}
+
 /// Nothing within sight fixes the way along the corridor, for hundreds of scans on end: there the
 /// legs have to carry the pose, and nothing may take back what they carried.
 #[test]

@@ -2,6 +2,7 @@
 
 mod program;
 
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use hachi_people::identify::AppearanceModel;
@@ -71,6 +72,8 @@ fn people_are_listed_renamed_exported_and_forgotten() {
     let exported = ["export", "Anna Unverwechselbar", "--out", text(&out)];
     people(&store, &exported).success();
     assert_eq!(names(&out), ["001.png", "002.jpg", "person.json"]);
+    let mode = std::fs::metadata(&out).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o700);
     assert_eq!(
         std::fs::read(out.join("001.png")).unwrap(),
         b"\x89PNG of them"

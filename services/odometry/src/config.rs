@@ -22,7 +22,8 @@ pub struct OdometryConfig {
     /// Time between two poses within a scan: short against the gait, long enough for the points
     /// in it to fix a pose.
     pub knot_interval_s: f64,
-    /// Accelerations that are ordinary for the robot.
+    /// Accelerations that are ordinary for the robot at its liveliest; a calmer way is learnt from the
+    /// scans.
     pub agility: Agility,
     /// Information about a direction, as a share of that about the best-known one, below which
     /// the scan is not asked about it. A narrow corridor with doors leaves half a percent, a

@@ -9,6 +9,7 @@
 //! judge, remember. It holds no thread, clock or file, and once warm it allocates nothing.
 #![forbid(unsafe_code)]
 
+mod agility;
 pub mod condition;
 pub mod config;
 pub mod measured;

@@ -7,6 +7,7 @@ use hachi_registration::{
     SurfaceCloud, SurfacePoint, TimedSurface,
 };
 
+use crate::agility::LearntAgility;
 use crate::condition::{Condition, Doubt};
 use crate::config::OdometryConfig;
 use crate::measured::{GyroBias, from_gyroscope, from_odometry};
@@ -102,6 +103,7 @@ pub struct Odometry {
     /// scans they were.
     elsewhere: Option<(LocalMap, usize)>,
     chain: Chain,
+    agility: LearntAgility,
     bias: GyroBias,
     motion: ScanMotion,
     source: SurfaceCloud,
@@ -134,6 +136,7 @@ impl Odometry {
             }),
             elsewhere: None,
             chain: Chain::starting_at(Pose::identity()),
+            agility: LearntAgility::default(),
             bias: GyroBias::default(),
             motion: ScanMotion::default(),
             source: SurfaceCloud::default(),
@@ -187,6 +190,7 @@ impl Odometry {
         let fitting = fit.fit_share / fit.inlier_share;
         let rate = (1.0 / self.good_fits as f64).max(0.05);
         self.usual_fit_share += rate * (fitting - self.usual_fit_share);
+        self.learn_agility(&timing, searched);
         self.learn_bias(input, &timing);
         self.remember(input, &timing);
         self.scale.follow(self.source.len());
@@ -346,7 +350,10 @@ impl Odometry {
     /// Aligns with the map; if that fails, looks farther and aligns again.
     fn place_on_map(&mut self) -> (Fit, bool) {
         let before = self.chain.clone();
-        let config = self.moving_config(self.map.cell_m(), 1.0);
+        let mut config = self.moving_config(self.map.cell_m(), 1.0);
+        config.agility = self
+            .agility
+            .agility(&config.agility, before.poses().len() - 1);
         let fit = self.aligner.align(
             &self.timed,
             &self.map,
@@ -410,6 +417,7 @@ impl Odometry {
     /// The scan fits nowhere in the map: perhaps it fits the misfits before it.
     fn misfit(&mut self, input: &ScanInput<'_>, timing: &Timing, poor: Fit) -> Estimate {
         self.misfits += 1;
+        self.agility.forget();
         let end = input.header.end;
         if let Some((mut map, scans)) = self.elsewhere.take() {
             let config = self.moving_config(map.cell_m(), 10.0);
@@ -519,6 +527,15 @@ impl Odometry {
             self.origin += shift;
             self.tidied_at -= shift;
         }
+    }
+
+    fn learn_agility(&mut self, timing: &Timing, searched: bool) {
+        if searched || timing.lead_s > 0.0 {
+            self.agility.forget();
+            return;
+        }
+        let motion = self.chain.poses()[0].inv_mul(self.chain.last());
+        self.agility.learn(&motion, timing.span_s);
     }
 
     fn learn_bias(&mut self, input: &ScanInput<'_>, timing: &Timing) {

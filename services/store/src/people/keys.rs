@@ -24,6 +24,9 @@ const HEADING: &str = "hachi people keys 1 ";
 const END: &str = "end";
 /// Far more than all keys together.
 const MOST_BYTES: u64 = 1 << 20;
+/// A file that is replaced while it is read may be caught when its old bytes are overwritten; the
+/// next time it is the new one.
+const ATTEMPTS: usize = 3;
 /// The owner alone.
 const MODE: u32 = 0o600;
 
@@ -48,6 +51,17 @@ impl KeyRing {
 
     /// Reads a key file; `None` if there is none.
     pub(super) fn read(path: &Path) -> Result<Option<Self>, PeopleError> {
+        let mut read = Self::read_once(path);
+        for _ in 1..ATTEMPTS {
+            if !matches!(read, Err(PeopleError::DamagedKeys { .. })) {
+                break;
+            }
+            read = Self::read_once(path);
+        }
+        read
+    }
+
+    fn read_once(path: &Path) -> Result<Option<Self>, PeopleError> {
         let problem = |error: io::Error| PeopleError::of_system(path, &error);
         let file = match File::open(path) {
             Ok(file) => file,
@@ -117,16 +131,11 @@ impl KeyRing {
         let _ = writeln!(text, "{END}");
 
         let new = beside(path);
-        let mut file = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .mode(MODE)
-            .open(&new)?;
-        // What was left of an interrupted change may have another mode.
-        file.set_permissions(fs::Permissions::from_mode(MODE))?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
+        if let Err(error) = write_new(&new, text.as_bytes()) {
+            // On a full disk; where even that fails, the next change removes it.
+            let _ = fs::remove_file(&new);
+            return Err(error);
+        }
         let old = match OpenOptions::new().write(true).open(path) {
             Ok(old) => Some(old),
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
@@ -147,6 +156,17 @@ fn beside(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".new");
     PathBuf::from(name)
+}
+
+/// A file of ours alone, on the disk when this is done.
+fn write_new(path: &Path, content: &[u8]) -> io::Result<()> {
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(true).mode(MODE);
+    let mut file = options.open(path)?;
+    // What was left of an interrupted change may have another mode.
+    file.set_permissions(fs::Permissions::from_mode(MODE))?;
+    file.write_all(content)?;
+    file.sync_all()
 }
 
 /// Nothing instead of what a file holds, on the disk as far as its file system writes in place.

@@ -80,8 +80,8 @@ pub struct PeopleRenameArguments {
 /// Arguments of `hachi people export`.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\
-Writes person.json (name, day, network, model) and the pictures, all of it readable by anybody who can \
-read the folder.
+Writes person.json (name, day, network, model) and the pictures, no longer encrypted. A folder that is \
+new can be read by its owner alone.
 
 Example:
   hachi people export Anna --out anna")]

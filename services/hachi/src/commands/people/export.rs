@@ -1,5 +1,9 @@
 //! `hachi people export`: all that is kept of somebody, for them to take.
 
+use std::fs::DirBuilder;
+use std::io;
+use std::os::unix::fs::DirBuilderExt;
+
 use hachi_people::identify::appearance_model::Statistics;
 use serde::Serialize;
 
@@ -40,6 +44,11 @@ pub fn run(arguments: &PeopleExportArguments) -> Result<(), Failure> {
     let person = store.find(&arguments.name).map_err(Failure::said)?;
     let stored = store.model(&person).map_err(Failure::said)?;
     let pictures = store.images(&person).map_err(Failure::said)?;
+    // A new folder is for its owner alone.
+    let made = DirBuilder::new().mode(0o700).create(&arguments.out);
+    if let Err(error) = made.or_else(allow_existing) {
+        return Err(Failure::writing(&arguments.out, &error));
+    }
     let results = Results::create(&arguments.out)?;
     let mut exported = Exported {
         name: person.name,
@@ -77,6 +86,13 @@ pub fn run(arguments: &PeopleExportArguments) -> Result<(), Failure> {
         exported.name,
         arguments.out.display(),
     ))
+}
+
+fn allow_existing(error: io::Error) -> io::Result<()> {
+    match error.kind() {
+        io::ErrorKind::AlreadyExists => Ok(()),
+        _ => Err(error),
+    }
 }
 
 /// The ending of a picture's name, by its first bytes.

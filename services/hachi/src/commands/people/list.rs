@@ -87,7 +87,8 @@ fn text(listed: &People) -> String {
     }
     if listed.unreadable > 0 {
         text += &format!(
-            "{} more can't be read: forget them with hachi people forget --unreadable\n",
+            "{} more can't be read: restore the key file that has their keys, or forget them with \
+             hachi people forget --unreadable\n",
             listed.unreadable
         );
     }
