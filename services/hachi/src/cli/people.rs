@@ -5,6 +5,7 @@ pub mod enrolled;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use hachi_inference::Own;
 use hachi_world::scenes::Script;
 
 /// What can be done about people.
@@ -43,6 +44,27 @@ pub struct NetworkArguments {
     /// The network that tells people apart [default: the first one in the folder].
     #[arg(long, value_name = "FILE.onnx")]
     pub reid: Option<PathBuf>,
+}
+
+impl NetworkArguments {
+    /// The two that are part of the program: for the simulated world, which is all they have seen.
+    pub fn own() -> Self {
+        let named = |own: Own| Some(PathBuf::from(own.name()));
+        Self {
+            models: None,
+            detector: named(Own::Detector),
+            reid: named(Own::ReId),
+        }
+    }
+
+    /// These, or the program's own where none is named.
+    #[must_use]
+    pub fn or_own(&self) -> Self {
+        match (&self.models, &self.detector, &self.reid) {
+            (None, None, None) => Self::own(),
+            _ => self.clone(),
+        }
+    }
 }
 
 /// Arguments of `hachi people track`.
@@ -130,7 +152,8 @@ pub struct EvalTracksArguments {
 Simulated people walk, cross, leave, come back and change their clothes for two to three minutes a \
 scene. One of them is picked after three seconds; from then on it is measured for how much of the time \
 in view they are followed, how often and how soon they are known again, and for how long somebody else \
-is followed: by the track alone, by FollowMe's calibration, by CARPE-ID, on the same tracks. Scenes: \
+is followed: by the track alone, by FollowMe's calibration, by CARPE-ID, on the same tracks. Unless \
+others are named, the networks are the program's own, which know the simulated world alone. Scenes: \
 return, crossing, jacket, wardrobe, similar, twin, light, crowd, far, turning.
 
 Example:

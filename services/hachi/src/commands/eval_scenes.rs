@@ -129,7 +129,7 @@ pub fn run(arguments: &EvalScenesArguments) -> Result<(), Failure> {
     let watched: Vec<(Script, Watched)> = scripts
         .par_iter()
         .map(|script| {
-            let observer = networks::observer(&arguments.networks)?;
+            let observer = networks::observer(&arguments.networks.or_own())?;
             let mut run = SceneRun::new(script.scene(arguments.seed), observer);
             if arguments.pictures.is_some() {
                 run.draw();

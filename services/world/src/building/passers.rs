@@ -13,7 +13,7 @@ use crate::trajectory::Trajectory;
 const AHEAD_M: f64 = 3.4;
 /// From the middle of the corridor: the robot's person, and those who pass the robot by, metres.
 const ASIDE_M: f64 = 0.45;
-const PASSING_M: f64 = -0.82;
+const PASSING_M: f64 = -0.62;
 /// People are about for so long, seconds.
 const LASTS_S: f64 = 900.0;
 /// The robot's way is looked at this often, seconds.
@@ -134,7 +134,7 @@ mod tests {
                         assert_eq!(free, None, "{} at {time_s} s", person.id);
                     }
                     let off = (at - robot).xy().norm();
-                    assert!(off > 0.7, "{} at {time_s} s: {off}", person.id);
+                    assert!(off > 0.5, "{} at {time_s} s: {off}", person.id);
                 }
             }
         }

@@ -176,7 +176,7 @@ fn spectacle(
     if world.people.is_empty() {
         return None;
     }
-    let observer = match networks::observer(&NetworkArguments::default()) {
+    let observer = match networks::observer(&NetworkArguments::own()) {
         Ok(observer) => observer,
         Err(failure) => {
             warn!("nobody is looked for: {failure}");
