@@ -97,6 +97,11 @@ impl Watch {
         track.filter(|track| sure && track.is_seen())
     }
 
+    /// What an enrolled person looks like by now.
+    pub fn model(&self, person: PersonId) -> Option<&AppearanceModel> {
+        self.identifier.model(person)
+    }
+
     /// Who is enrolled, to be changed.
     pub fn identifier(&mut self) -> &mut Identifier {
         &mut self.identifier

@@ -91,6 +91,9 @@ pub struct PeopleTrackArguments {
     /// Frames a second [default: what seqinfo.ini beside them says, else 10].
     #[arg(long, value_name = "N", value_parser = frames_per_second)]
     pub fps: Option<f64>,
+    /// Draw every frame with everybody marked into this folder, and some of them on one sheet.png.
+    #[arg(long, value_name = "DIR", conflicts_with = "detections")]
+    pub pictures: Option<PathBuf>,
     /// The networks for frames.
     #[command(flatten)]
     pub networks: NetworkArguments,
@@ -165,6 +168,9 @@ pub struct EvalScenesArguments {
     /// Who plays, in which clothes, and where exactly.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Only so much of each scene, seconds [default: all of it].
+    #[arg(long, value_name = "S", value_parser = super::seconds)]
+    pub seconds: Option<f64>,
     /// Draw twelve frames of each scene with everybody marked, NAME.png, into this folder.
     #[arg(long, value_name = "DIR")]
     pub pictures: Option<PathBuf>,

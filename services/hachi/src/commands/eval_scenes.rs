@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use hachi_inference::ImageView;
 use hachi_people::BoundingBox;
-use hachi_people::followed::{Score, ScoreKeeper};
+use hachi_people::followed::{Followed, Score, ScoreKeeper, Sight};
 use hachi_people::identify::{AppearanceModel, Calibration, IdentifierConfig};
 use hachi_people::observe::{Observation, Observer};
 use hachi_people::track::Track;
@@ -18,6 +18,7 @@ use hachi_world::SimulatedCamera;
 use hachi_world::scenes::{Script, ScriptedScene};
 use rayon::prelude::*;
 use serde::Serialize;
+use tracing::debug;
 
 use crate::cli::people::EvalScenesArguments;
 use crate::exit::Failure;
@@ -121,16 +122,22 @@ pub fn run(arguments: &EvalScenesArguments) -> Result<(), Failure> {
         false => arguments.scenes.clone(),
     };
     let cancelled = Cancelled::on_interrupt()?;
-    let total_s: f64 = scripts
+    let scene = |script: &Script| {
+        let mut scene = script.scene(arguments.seed);
+        let lasts_s = &mut scene.simulation.duration_s;
+        *lasts_s = arguments.seconds.map_or(*lasts_s, |most| lasts_s.min(most));
+        scene
+    };
+    let lasting = scripts
         .iter()
-        .map(|script| script.scene(arguments.seed).simulation.duration_s)
-        .sum();
+        .map(|script| scene(script).simulation.duration_s);
+    let total_s: f64 = lasting.sum();
     let bar = progress::bar(Some((total_s * 10.0) as u64), "frames");
     let watched: Vec<(Script, Watched)> = scripts
         .par_iter()
         .map(|script| {
             let observer = networks::observer(&arguments.networks.or_own())?;
-            let mut run = SceneRun::new(script.scene(arguments.seed), observer);
+            let mut run = SceneRun::new(scene(script), observer);
             if arguments.pictures.is_some() {
                 run.draw();
             }
@@ -292,9 +299,22 @@ impl SceneRun {
             let target = self.scene.target;
             let person = frame.people.iter().find(|person| person.id == target);
             let sight = people_truth::sight(person, color.width);
-            for (keeper, followed) in self.keepers.iter_mut().zip(boxes) {
-                let followed = people_truth::followed(followed, &frame.people, target);
+            let right = boxes.map(|b| people_truth::followed(b, &frame.people, target));
+            for (keeper, followed) in self.keepers.iter_mut().zip(right) {
                 keeper.step(dt_s, sight, followed);
+            }
+            if right[2] == Followed::Wrong || (sight, right[2]) == (Sight::Clear, Followed::Nobody)
+            {
+                let person = person.map(|person| (person.visible, person.visible_share()));
+                debug!(at_s, ?right, ?person, ?status, detections = ?observed.detections);
+                for track in tracks {
+                    let looks = track.detection.and_then(|d| observed.features?.get(d));
+                    let model = status.and_then(|status| self.watch.model(status.person));
+                    let distance = looks.zip(model).map(|(looks, model)| model.distance(looks));
+                    let threshold = model.map(AppearanceModel::threshold);
+                    let b = track.bounding_box();
+                    debug!(id = track.id, ?track.state, ?b, ?distance, ?threshold);
+                }
             }
         }
         if let Some(sheet) = &mut self.sheet {
@@ -307,7 +327,7 @@ impl SceneRun {
                     found: self.observer.found(),
                     caption: &format!("{at_s:.1} S"),
                 };
-                sheet.push(annotate(&image, &labels));
+                sheet.push(&annotate(&image, &labels));
             }
         }
         Ok(true)

@@ -18,6 +18,8 @@ const PASSING_M: f64 = -0.62;
 const LASTS_S: f64 = 900.0;
 /// The robot's way is looked at this often, seconds.
 const STEP_S: f64 = 0.5;
+/// Who stands has come this way last, metres.
+const TURN_M: f64 = 1e-3;
 /// Who moves less in a step stands, metres.
 const STANDS_M: f64 = 0.12;
 
@@ -46,18 +48,21 @@ fn ahead(ring: &Ring, robot: &Trajectory, cast: &mut Cast) -> Person {
         let end = (begin..steps)
             .find(|&step| walks(step) != walking)
             .unwrap_or(steps);
-        let lasts_s = (end - begin) as f64 * STEP_S;
-        let length_m = way[end] - way[begin];
-        let path = ring.between(way[begin], way[end], ASIDE_M);
+        // A little longer than to the next one: nobody is away in between.
+        let lasts_s = (end - begin) as f64 * STEP_S + 1e-6;
+        let path = match walking {
+            true => ring.between(way[begin], way[end], ASIDE_M),
+            // The last step's way, so that they look where they went.
+            false => ring.between(way[begin] - TURN_M, way[begin], ASIDE_M),
+        };
+        // Corners are cut on the inside.
+        let legs = path.iter().zip(path.iter().skip(1));
+        let length_m: f64 = legs.map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1])).sum();
         person.visits.push(Visit {
             begins_s: begin as f64 * STEP_S,
-            path: match walking {
-                true => path,
-                // The last step's way, so that they look where they went.
-                false => ring.between(way[begin] - 1e-3, way[begin], ASIDE_M),
-            },
+            path,
             speed_m_s: if walking { length_m / lasts_s } else { 1.0 },
-            stays_s: if walking { 0.0 } else { lasts_s - 1e-3 },
+            stays_s: if walking { 0.0 } else { lasts_s },
             outfit,
         });
         begin = end;

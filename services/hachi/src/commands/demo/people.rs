@@ -185,7 +185,7 @@ impl Album {
             caption: &format!("{at_s:.1} S"),
         };
         let sheet = self.sheet.get_or_insert_with(|| ContactSheet::new(COLUMNS));
-        sheet.push(annotate(&image, &labels));
+        sheet.push(&annotate(&image, &labels));
     }
 }
 
