@@ -1,6 +1,6 @@
 //! From what was seen in a frame to who is where: tracks, and the people who are known among them.
 //!
-//! In: an [`Observation`](crate::observe::Observation) and the time since the last one; the place in the picture that the
+//! In: an [`Observation`] and the time since the last one; the place in the picture that the
 //! user points at. Out: tracks, and for each enrolled person where they are. [`Watch::step`] is the
 //! pipeline behind [`Observer::observe`](crate::observe::Observer::observe): both together take a
 //! camera's frame to what is known. Robots, recordings and simulated scenes go through the same two.

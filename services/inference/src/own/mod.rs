@@ -36,7 +36,7 @@ impl Own {
     }
 
     /// The ONNX file.
-    pub(crate) const fn bytes(self) -> &'static [u8] {
+    pub const fn bytes(self) -> &'static [u8] {
         match self {
             Self::Detector => include_bytes!("detector.onnx"),
             Self::ReId => include_bytes!("reid.onnx"),
