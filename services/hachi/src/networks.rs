@@ -8,10 +8,11 @@
 use std::path::{Path, PathBuf};
 
 use hachi_inference::load::manifest_of;
-use hachi_inference::{Decoder, LoadError, LoadOptions, Loaded, ManifestError, known, load};
+use hachi_inference::{Decoder, LoadError, LoadOptions, Loaded, ManifestError, Own, known, load};
 use hachi_people::appearance::Appearance;
 use hachi_people::detect::{Detector, Wanted};
 use hachi_people::observe::Observer;
+use hachi_store::people::NetworkIdentity;
 
 use crate::cli::people::NetworkArguments;
 use crate::exit::Failure;
@@ -66,6 +67,23 @@ impl Chosen {
             })
         });
         Ok(Observer::new(detector, appearance.transpose()?))
+    }
+
+    /// Which network tells people apart, by its content.
+    ///
+    /// # Errors
+    /// There is none, or it can't be read.
+    pub fn identity(&self) -> Result<NetworkIdentity, Failure> {
+        let path = self.appearance.as_deref().ok_or_else(no_appearance)?;
+        if let Some(own) = Own::from_name(path) {
+            return Ok(NetworkIdentity::of_bytes(own.name(), own.bytes()));
+        }
+        NetworkIdentity::of_file(path).map_err(|error| {
+            Failure::new(
+                format_args!("{} can't be read: {error}", path.display()),
+                "check the name and that you may read it",
+            )
+        })
     }
 }
 

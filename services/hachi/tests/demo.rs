@@ -30,6 +30,24 @@ fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
     // A map that begins here is trusted from its first scan on.
     assert_eq!(report["map_conditions"]["ok"], report["conditions"]["ok"]);
 
+    // Its person is in view and followed all the while, and nobody else is.
+    let people = &report["people"];
+    assert!(
+        (29..=32).contains(&people["pictures"].as_u64().unwrap()),
+        "{people}"
+    );
+    assert!(
+        people["person"]["visible_s"].as_f64().unwrap() > 3.0,
+        "{people}"
+    );
+    assert!(
+        people["person"]["tracked_share"].as_f64().unwrap() > 0.8,
+        "{people}"
+    );
+    assert_eq!(people["person"]["wrong_s"], 0.0, "{people}");
+    let sheet = hachi::images::read(&out.join("people.png")).unwrap();
+    assert!(sheet.width > 3 * 424, "{}", sheet.width);
+
     // The figure of the report, measured once more from the files.
     let evaluated = program::run(&[
         "eval",
@@ -117,6 +135,7 @@ fn what_the_help_calls_results_is_there_and_nothing_half_written() {
             "map.ply",
             "map.png",
             "odometry.tum",
+            "people.png",
             "report.json",
             "trajectory.svg",
             "trajectory.tum",

@@ -10,6 +10,7 @@
 //! | [`manifest`] | [`Manifest`]: how to feed a model and read its answer, from TOML |
 //! | [`known`] | manifests of published models that have none beside them |
 //! | [`load`](mod@load) | a model from its file, on the back end that is there, checked against its manifest |
+//! | `own` | with the feature `own`: two small networks in the program itself, for the simulated world |
 //! | [`onnx_file`] | whether bytes are a whole ONNX file |
 //! | [`preprocess`] | an image, or a part of it, as a model's input |
 //! | [`fixed`] | a model of fixed answers, for tests without weights |
@@ -28,6 +29,8 @@ pub mod model;
 pub mod onnx_file;
 #[cfg(feature = "onnxruntime")]
 mod onnxruntime;
+#[cfg(feature = "own")]
+pub mod own;
 pub mod preprocess;
 mod resample;
 pub mod tensor;
@@ -35,5 +38,7 @@ pub mod tensor;
 pub use load::{BackEnd, LoadError, LoadOptions, Loaded, load};
 pub use manifest::{Decoder, InputLayout, Manifest, ManifestError};
 pub use model::{Model, Port, RunError, Signature};
+#[cfg(feature = "own")]
+pub use own::Own;
 pub use preprocess::{ImageError, ImageView, Placement, Preprocessor, Region};
 pub use tensor::Tensor;

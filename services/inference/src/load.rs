@@ -1,7 +1,8 @@
 //! A model from its file, on the back end that is there, checked against its manifest.
 //!
 //! In: the path of an ONNX file. Its manifest lies beside it (the same name with `.toml`), or is
-//! one of the [`known`]. Out: a [`Loaded`] model that has answered once: what it announces and
+//! one of the [`known`]. With the feature `own`, the name of a network in the program itself does
+//! as well. Out: a [`Loaded`] model that has answered once: what it announces and
 //! what it gives are what the manifest says, in shape and in finite numbers.
 
 use std::fs::File;
@@ -137,7 +138,10 @@ pub enum LoadError {
 /// # Errors
 /// [`LoadError`], with what was expected and found.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let bytes = read(path, MAX_MODEL_BYTES)?;
+    let bytes = match own_bytes(path) {
+        Some(bytes) => bytes.to_vec(),
+        None => read(path, MAX_MODEL_BYTES)?,
+    };
     let manifest = manifest_of(path, options)?;
     let wrong = |source| LoadError::Manifest {
         path: path.to_owned(),
@@ -176,11 +180,15 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     Ok(Loaded { manifest, model })
 }
 
-/// The manifest of a model: named, beside it, or known.
+/// The manifest of a model: named, its own, beside it, or known.
 ///
 /// # Errors
 /// There is none, or it is wrong.
 pub fn manifest_of(path: &Path, options: &LoadOptions) -> Result<Manifest, LoadError> {
+    let own = own_manifest(path).filter(|_| options.manifest.is_none());
+    if let Some(text) = own {
+        return parse(text, path);
+    }
     let beside = path.with_extension("toml");
     let file = options.manifest.clone().unwrap_or_else(|| beside.clone());
     let stem = path.file_stem().and_then(|stem| stem.to_str());
@@ -198,7 +206,34 @@ pub fn manifest_of(path: &Path, options: &LoadOptions) -> Result<Manifest, LoadE
         }
         Err(error) => return Err(error),
     };
-    Manifest::from_toml(&text).map_err(|source| LoadError::Manifest { path: file, source })
+    parse(&text, &file)
+}
+
+fn parse(text: &str, path: &Path) -> Result<Manifest, LoadError> {
+    Manifest::from_toml(text).map_err(|source| LoadError::Manifest {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+#[cfg(feature = "own")]
+fn own_bytes(path: &Path) -> Option<&'static [u8]> {
+    crate::own::Own::from_name(path).map(crate::own::Own::bytes)
+}
+
+#[cfg(feature = "own")]
+fn own_manifest(path: &Path) -> Option<&'static str> {
+    crate::own::Own::from_name(path).map(crate::own::Own::manifest)
+}
+
+#[cfg(not(feature = "own"))]
+const fn own_bytes(_: &Path) -> Option<&'static [u8]> {
+    None
+}
+
+#[cfg(not(feature = "own"))]
+const fn own_manifest(_: &Path) -> Option<&'static str> {
+    None
 }
 
 fn read(path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {

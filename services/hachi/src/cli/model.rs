@@ -23,7 +23,7 @@ The manifest lies beside the model, with .toml for .onnx; some published models 
 Example:
   hachi model check detector.onnx --json")]
 pub struct ModelArguments {
-    /// The model.
+    /// The model: a file, `own:detector` or `own:reid`.
     #[arg(value_name = "MODEL.onnx")]
     pub model: PathBuf,
     /// Its manifest, if it lies elsewhere.

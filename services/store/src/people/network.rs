@@ -37,6 +37,14 @@ impl NetworkIdentity {
         })
     }
 
+    /// The identity of a network that lies in memory as its file would.
+    pub fn of_bytes(name: &str, bytes: &[u8]) -> Self {
+        Self {
+            name: shortened(name),
+            sha256: Sha256::digest(bytes).into(),
+        }
+    }
+
     /// The hash in hexadecimal digits.
     pub fn sha256_hex(&self) -> String {
         hex(&self.sha256)
@@ -61,4 +69,24 @@ fn shortened(name: &str) -> String {
 
 pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_content_is_known_by_its_hash_in_a_file_and_in_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("osnet.v2.onnx");
+        std::fs::write(&path, b"abc").unwrap();
+        let of_file = NetworkIdentity::of_file(&path).unwrap();
+        // FIPS 180-2, appendix B.1.
+        let hex = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(of_file.sha256_hex(), hex);
+        assert_eq!(of_file.name, "osnet.v2");
+        let in_memory = NetworkIdentity::of_bytes(&"x".repeat(500), b"abc");
+        assert!(in_memory.is(&of_file));
+        assert_eq!(in_memory.name.len(), 100);
+    }
 }

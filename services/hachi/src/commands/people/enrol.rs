@@ -52,14 +52,7 @@ pub fn run(arguments: &PeopleEnrolArguments) -> Result<(), Failure> {
     // A name that can't be had is better known before the work than after it.
     store.check_name(&arguments.name).map_err(Failure::said)?;
     let chosen = networks::chosen(&arguments.networks)?;
-    let network = chosen.appearance.as_deref();
-    let network = network.ok_or_else(networks::no_appearance)?;
-    let network = NetworkIdentity::of_file(network).map_err(|error| {
-        Failure::new(
-            format_args!("{} can't be read: {error}", network.display()),
-            "check the name and that you may read it",
-        )
-    })?;
+    let network = chosen.identity()?;
     let mut observer = chosen.open()?;
     let cancelled = Cancelled::on_interrupt()?;
 
