@@ -524,6 +524,7 @@ impl Odometry {
                 .shift_origin([cells.x as i32, cells.y as i32, cells.z as i32]);
             let shift = cells * edge;
             self.chain.translate(&-shift);
+            self.agility.translate(&-shift);
             self.origin += shift;
             self.tidied_at -= shift;
         }
@@ -534,8 +535,8 @@ impl Odometry {
             self.agility.forget();
             return;
         }
-        let motion = self.chain.poses()[0].inv_mul(self.chain.last());
-        self.agility.learn(&motion, timing.span_s);
+        let poses = self.chain.poses();
+        self.agility.learn(poses[poses.len() / 2], timing.span_s);
     }
 
     fn learn_bias(&mut self, input: &ScanInput<'_>, timing: &Timing) {

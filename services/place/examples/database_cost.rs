@@ -6,14 +6,16 @@
 //! by place. Half of the searches take no longer than the first figure: on a busy machine it says
 //! more than the mean. Describing is timed on a cloud of 30,000 points.
 //!
-//! `cargo run --release -p hachi-place --example database_cost`
+//! `cargo run --release -p hachi-place --example database_cost -- [PICTURE.svg]`
 
 #![allow(clippy::print_stdout, reason = "a program's output")]
 
 use std::error::Error;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use hachi_place::{Database, Describer, DescriberConfig, Descriptor, Kind, Profile};
+use plotters::prelude::*;
 
 const SIZES: [usize; 7] = [100, 1_000, 5_000, 10_000, 20_000, 35_000, 50_000];
 /// Searches for each row.
@@ -35,6 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut matches = Vec::new();
     println!("\nplaces   search ms: half  p99   found   insert ms: mean  worst   file kB/place");
     let mut inserted = Vec::new();
+    let mut costs = Vec::new();
     for place in 0..=SIZES[SIZES.len() - 1] {
         if SIZES.contains(&place) {
             let mut searched = Vec::new();
@@ -50,10 +53,12 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let near = |id: u64| id.abs_diff(known as u64) <= 2;
                 found += usize::from(matches.first().is_some_and(|m| near(m.id)));
             }
+            let cost = [0.5, 0.99].map(|share| ms(quantile(&mut searched, share)));
+            costs.push((place as f64, cost));
             println!(
                 "{place:>6}            {:>6.3} {:>5.3}   {:>3} %              {:>6.4} {:>6.2}   {:>13.2}",
-                ms(quantile(&mut searched, 0.5)),
-                ms(quantile(&mut searched, 0.99)),
+                cost[0],
+                cost[1],
                 found * 100 / SEARCHES,
                 ms(mean(&inserted)),
                 ms(inserted.iter().max().copied().unwrap_or_default()),
@@ -67,6 +72,32 @@ fn main() -> Result<(), Box<dyn Error>> {
         database.insert(place as u64, &one)?;
         inserted.push(start.elapsed());
     }
+    match std::env::args_os().nth(1) {
+        Some(path) => draw(path.as_ref(), &costs),
+        None => Ok(()),
+    }
+}
+
+/// The search's cost over the places known: half of the searches, and 99 of 100, take no longer.
+fn draw(path: &Path, costs: &[(f64, [f64; 2])]) -> Result<(), Box<dyn Error>> {
+    let most = costs.iter().map(|(_, cost)| cost[1]).fold(0.0, f64::max);
+    let root = SVGBackend::new(path, (800, 440)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(16)
+        .set_label_area_size(LabelAreaPosition::Left, 56)
+        .set_label_area_size(LabelAreaPosition::Bottom, 48)
+        .build_cartesian_2d(0.0..50_000.0, 0.0..1.1 * most)?;
+    let mut mesh = chart.configure_mesh();
+    mesh.x_desc("places known").y_desc("search, ms");
+    mesh.x_label_formatter(&|x| format!("{x:.0}"));
+    mesh.light_line_style(TRANSPARENT).draw()?;
+    for (which, colour) in [(1, RGBColor(178, 24, 43)), (0, RGBColor(33, 102, 172))] {
+        let line = costs.iter().map(|(places, cost)| (*places, cost[which]));
+        chart.draw_series(LineSeries::new(line.clone(), colour.stroke_width(2)))?;
+        chart.draw_series(line.map(|at| Circle::new(at, 4, colour.filled())))?;
+    }
+    root.present()?;
     Ok(())
 }
 
