@@ -1,7 +1,4 @@
-//! What the end-to-end tests share: the simulated robot as scans, errors against its truth, and a
-//! camera's firmware.
-
-pub mod firmware;
+//! What the end-to-end tests share: the simulated robot as scans, and errors against its truth.
 
 use hachi_hal::{LidarScans, Point, Pose, ScanHeader, Stamp};
 use hachi_velodyne::{VelodyneConfig, VelodyneScans};

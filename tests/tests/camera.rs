@@ -3,163 +3,23 @@
 
 use hachi_hal::{Pose, RgbdCamera, RgbdGeometry, RgbdImages, Stamp, Vector3};
 use hachi_realsense::align::depth_to_color;
-use hachi_realsense::controls::{Query, Selector};
-use hachi_realsense::device::{
-    Buffer, CameraLink, CameraPort, CameraRequest, LinkError, Part, Stream, StreamFormat,
-};
-use hachi_realsense::frame::{CaptureTiming, DepthState, FrameMetadata, Layout};
-use hachi_realsense::monitor::DeviceInfo;
-use hachi_realsense::{CameraError, Model, RealSense, RealSenseConfig, encode};
-use hachi_tests::firmware::Firmware;
+use hachi_realsense::device::simulated::SimulatedPort;
+use hachi_realsense::device::{LinkError, StreamFormat};
+use hachi_realsense::{CameraError, RealSense, RealSenseConfig};
 use hachi_world::{
     CameraConfig, CameraFrame, Outfit, Person, Preset, SimulatedCamera, SimulationConfig, Visit,
 };
-use std::cell::RefCell;
-use std::collections::VecDeque;
-use std::rc::Rc;
 
 const WIDTH: u32 = 424;
 const HEIGHT: u32 = 240;
 const PIXELS: usize = (WIDTH * HEIGHT) as usize;
-/// Frames until the camera is pulled out for a moment, and all of them.
+/// Frames until the camera is pulled out for a moment, and all of them. Its clock wraps at the fifth.
 const UNPLUGGED_AFTER: usize = 4;
 const FRAMES: usize = 8;
-const EXPOSURE_US: u32 = 8_000;
-const INFO: DeviceInfo = DeviceInfo {
-    firmware: [5, 16, 0, 1],
-    serial: [9; 6],
-};
+/// From a reading of the camera's clock to the next one, half an exposure later, ns.
+const HALF_EXPOSURE_NS: i64 = 4_000_000;
 /// From the middle of an exposure to the kernel's stamp, ns.
 const WAY_NS: i64 = 6_000_000;
-
-/// What the world showed, for the test to look at.
-type Shown = Rc<RefCell<Vec<CameraFrame>>>;
-
-/// A D455 that sees the simulated world.
-struct Simulated {
-    camera: Rc<RefCell<SimulatedCamera>>,
-    start: Stamp,
-    shown: Shown,
-    sequence: u32,
-    frames_left: usize,
-    waiting: VecDeque<(Stream, Part, Vec<u8>)>,
-    received: Stamp,
-    firmware: Firmware,
-}
-
-impl Simulated {
-    /// Puts the next frame's four buffers in line.
-    fn expose(&mut self) -> bool {
-        let mut camera = self.camera.borrow_mut();
-        let Some(frame) = camera.next_frame() else {
-            return false;
-        };
-        // The camera's clock, 32 bits of microseconds, wraps after the fifth frame.
-        let since_us = frame.stamp.nanos_since(self.start) / 1_000;
-        let exposed_us = (u32::MAX - 150_000).wrapping_add(since_us as u32);
-        let metadata = |depth: Option<DepthState>| {
-            let said = FrameMetadata {
-                device_us: Some(exposed_us.wrapping_add(EXPOSURE_US / 2)),
-                timing: CaptureTiming {
-                    sensor_us: Some(exposed_us),
-                    exposure_us: Some(EXPOSURE_US),
-                    ..CaptureTiming::default()
-                },
-                depth,
-                ..FrameMetadata::default()
-            };
-            let (bytes, len) = encode::metadata(&said);
-            bytes[..len].to_vec()
-        };
-        self.waiting.extend([
-            (Stream::Depth, Part::Picture, frame.depth.clone()),
-            (Stream::Color, Part::Metadata, metadata(None)),
-            (Stream::Color, Part::Picture, frame.color.clone()),
-            (
-                Stream::Depth,
-                Part::Metadata,
-                metadata(Some(DepthState::default())),
-            ),
-        ]);
-        self.received = frame.stamp + WAY_NS;
-        self.shown.borrow_mut().push(frame.clone());
-        self.sequence += 1;
-        true
-    }
-}
-
-impl CameraLink for Simulated {
-    fn model(&self) -> Model {
-        Model::D455
-    }
-    fn layout(&self, _: Stream) -> Layout {
-        Layout::packed(WIDTH, HEIGHT)
-    }
-    fn has_metadata(&self, _: Stream) -> bool {
-        true
-    }
-    fn set_unit(&mut self, selector: Selector, bytes: &[u8]) -> Result<(), LinkError> {
-        self.firmware.set(selector, bytes);
-        Ok(())
-    }
-    fn get_unit(&mut self, _: Selector, query: Query, bytes: &mut [u8]) -> Result<(), LinkError> {
-        self.firmware.get(query, bytes);
-        Ok(())
-    }
-    fn set_video(&mut self, _: Stream, _: u32, _: i32) -> Result<(), LinkError> {
-        Ok(())
-    }
-    fn start(&mut self) -> Result<(), LinkError> {
-        Ok(())
-    }
-    fn dequeue(&mut self, _: Stamp, take: &mut dyn FnMut(Buffer<'_>)) -> Result<bool, LinkError> {
-        if self.waiting.is_empty() {
-            let Some(left) = self.frames_left.checked_sub(1) else {
-                return Err(LinkError::Unplugged);
-            };
-            self.frames_left = left;
-            if !self.expose() {
-                return Ok(false);
-            }
-        }
-        let Some((stream, part, bytes)) = self.waiting.pop_front() else {
-            return Ok(false);
-        };
-        take(Buffer {
-            stream,
-            part,
-            sequence: self.sequence,
-            received: self.received,
-            damaged: false,
-            bytes: &bytes,
-        });
-        Ok(true)
-    }
-}
-
-/// The same camera each time it is plugged in, for so many frames.
-struct Plugs {
-    camera: Rc<RefCell<SimulatedCamera>>,
-    start: Stamp,
-    shown: Shown,
-    frames: VecDeque<usize>,
-}
-
-impl CameraPort for Plugs {
-    type Link = Simulated;
-    fn open(&mut self, _: &CameraRequest, _: Stamp) -> Result<Option<Simulated>, LinkError> {
-        Ok(self.frames.pop_front().map(|frames_left| Simulated {
-            camera: Rc::clone(&self.camera),
-            start: self.start,
-            shown: Rc::clone(&self.shown),
-            sequence: 0,
-            frames_left,
-            waiting: VecDeque::new(),
-            received: self.start,
-            firmware: Firmware::new(INFO, self.camera.borrow().config().geometry),
-        }))
-    }
-}
 
 const OUTFIT: Outfit = Outfit {
     top: [190, 40, 40],
@@ -239,44 +99,52 @@ fn a_person_in_the_simulated_world_is_where_the_driver_says() {
     let config = CameraConfig::d455(WIDTH, HEIGHT, 0.2);
     let expected = config.geometry;
     let base_from_color = config.base_from_depth * expected.color_from_depth.inverse();
-    let camera = SimulatedCamera::new(&simulation, config);
-    let shown = Shown::default();
-    let plugs = Plugs {
-        camera: Rc::new(RefCell::new(camera)),
-        start: simulation.start,
-        shown: Rc::clone(&shown),
-        frames: [UNPLUGGED_AFTER, FRAMES - UNPLUGGED_AFTER].into(),
-    };
+    let mut camera = SimulatedCamera::new(&simulation, config);
+    let port = SimulatedPort::new(expected);
     let format = StreamFormat::new(WIDTH, HEIGHT, 30);
     let settings = RealSenseConfig {
         depth: format,
         color: format,
         ..RealSenseConfig::default()
     };
-    let mut driver = RealSense::new(plugs, settings);
+    let mut driver = RealSense::new(port.clone(), settings);
     let (mut depth, mut color) = (vec![0; PIXELS], vec![0; 3 * PIXELS]);
     let mut aligned = vec![0; PIXELS];
-    let (mut frames, mut unplugged) = (0, 0);
-    while frames < FRAMES {
-        let images = RgbdImages {
-            depth: &mut depth,
-            color: &mut color,
+    let mut unplugged = 0;
+    for frames in 0..FRAMES {
+        if frames == UNPLUGGED_AFTER {
+            port.plug(false);
+            port.plug(true);
+        }
+        let mut read = |at: Stamp| {
+            let images = RgbdImages {
+                depth: &mut depth,
+                color: &mut color,
+            };
+            driver.read_frame(images, at)
         };
-        let header = match driver.read_frame(images, Stamp::from_nanos(i64::MAX)) {
-            Ok(Some(header)) => header,
+        // Opens it, or finds that it is gone.
+        match read(simulation.start) {
+            Ok(None) => {}
             Err(CameraError::Link(LinkError::Unplugged)) => {
                 unplugged += 1;
-                continue;
+                assert!(read(simulation.start).unwrap().is_none());
             }
             other => panic!("{other:?}"),
-        };
-        let shown = shown.borrow();
-        let truth = &shown[frames];
+        }
+        let truth = camera.next_frame().unwrap();
+        port.expose(
+            truth.stamp,
+            truth.stamp + WAY_NS,
+            &truth.depth,
+            &truth.color,
+        );
+        let header = read(truth.stamp + WAY_NS).unwrap().unwrap();
         assert_eq!(header.sequence as usize, frames);
         // The driver takes the way to the kernel for the least that it has seen: all but the half
         // exposure between the two readings of the camera's clock.
         let late_ns = header.stamp.nanos_since(truth.stamp);
-        let expected_ns = WAY_NS - i64::from(EXPOSURE_US / 2) * 1_000;
+        let expected_ns = WAY_NS - HALF_EXPOSURE_NS;
         assert!((late_ns - expected_ns).abs() < 2_000, "{late_ns}");
         assert_eq!(header.color_stamp, header.stamp);
         let geometry = *driver.geometry().unwrap();
@@ -314,7 +182,6 @@ fn a_person_in_the_simulated_world_is_where_the_driver_says() {
             (85.0..195.0).contains(&r) && r > 2.5 * g && r > 2.5 * b,
             "{r} {g} {b}"
         );
-        frames += 1;
     }
     assert_eq!(unplugged, 1);
     let counters = driver.counters();

@@ -11,13 +11,13 @@ use hachi_hal::{
 };
 use hachi_realsense::align::depth_to_color;
 use hachi_realsense::controls::{Query, Selector};
+use hachi_realsense::device::simulated::Firmware;
 use hachi_realsense::device::{
     Buffer, CameraLink, CameraPort, CameraRequest, LinkError, Part, Stream, StreamFormat,
 };
 use hachi_realsense::frame::{CaptureTiming, DepthState, FrameMetadata, Layout};
 use hachi_realsense::monitor::DeviceInfo;
 use hachi_realsense::{Model, RealSense, RealSenseConfig, encode};
-use hachi_tests::firmware::Firmware;
 use ros1::Message;
 
 const PIXELS: usize = 640 * 480;

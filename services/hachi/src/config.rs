@@ -15,7 +15,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
 use crate::service::settings::{
-    EmergencyStopConfig, LidarConfig, RobotConfig, RowConfig, ServiceConfig,
+    CameraConfig, EmergencyStopConfig, LidarConfig, PeopleConfig, RobotConfig, RowConfig,
+    ServiceConfig,
 };
 
 /// What is known of the motion besides the scans.
@@ -118,6 +119,10 @@ pub struct Settings {
     pub robot: RobotConfig,
     /// The LiDAR's packets.
     pub lidar: LidarConfig,
+    /// The camera.
+    pub camera: CameraConfig,
+    /// People in its sight.
+    pub people: PeopleConfig,
     /// An emergency stop besides the remote control's.
     pub emergency_stop: EmergencyStopConfig,
     /// Limits of the gate.

@@ -94,6 +94,31 @@ pub struct ContactSheet {
 
 /// Pixels between two pictures.
 const GAP: usize = 4;
+/// The widest picture on a sheet.
+const MOST_COLUMNS: usize = 480;
+
+/// A picture of at most so many columns: each pixel the mean of a square.
+fn shrunk(picture: &Rgb, most_columns: usize) -> Rgb {
+    let by = picture.width.div_ceil(most_columns).max(1);
+    let (width, height) = (picture.width / by, picture.height / by);
+    let mut pixels = Vec::with_capacity(3 * width * height);
+    for place in 0..width * height {
+        let (left, top) = (place % width * by, place / width * by);
+        for channel in 0..3 {
+            let rows = top..top + by;
+            let square = rows.flat_map(|y| (left..left + by).map(move |x| (x, y)));
+            let values = square.map(|(x, y)| 3 * (y * picture.width + x) + channel);
+            let sum: usize = values.map(|at| usize::from(picture.pixels[at])).sum();
+            // The mean of bytes is one.
+            pixels.push((sum / (by * by)) as u8);
+        }
+    }
+    Rgb {
+        width,
+        height,
+        pixels,
+    }
+}
 
 impl ContactSheet {
     /// An empty one with so many pictures in a row.
@@ -104,14 +129,9 @@ impl ContactSheet {
         }
     }
 
-    /// Adds a picture.
-    pub fn push(&mut self, picture: Rgb) {
-        self.pictures.push(picture);
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.pictures.is_empty()
+    /// Adds a picture; one that is wider than others are is made smaller.
+    pub fn push(&mut self, picture: &Rgb) {
+        self.pictures.push(shrunk(picture, MOST_COLUMNS));
     }
 
     /// All of them, row by row, each in a cell as large as the largest.
@@ -220,7 +240,7 @@ mod tests {
     fn a_sheet_holds_its_pictures_row_by_row() {
         let mut sheet = ContactSheet::new(2);
         for shade in [10, 20, 30] {
-            sheet.push(Rgb {
+            sheet.push(&Rgb {
                 width: 4,
                 height: 2,
                 pixels: vec![shade; 24],
@@ -236,5 +256,21 @@ mod tests {
         let path = folder.path().join("sheet.png");
         sheet.write(&path).unwrap();
         assert_eq!(crate::images::read(&path).unwrap(), picture);
+    }
+
+    #[test]
+    fn a_large_picture_is_made_smaller_by_means() {
+        let pixels = (0..4 * 2).flat_map(|i| [i * 10, 0, 200]).collect();
+        let small = shrunk(
+            &Rgb {
+                width: 4,
+                height: 2,
+                pixels,
+            },
+            2,
+        );
+        // (0 + 10 + 40 + 50) / 4 and (20 + 30 + 60 + 70) / 4.
+        assert_eq!(small.pixels, [25, 0, 200, 45, 0, 200]);
+        assert_eq!((small.width, small.height), (2, 1));
     }
 }

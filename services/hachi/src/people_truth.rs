@@ -56,7 +56,8 @@ fn owner(bounding_box: &BoundingBox, people: &[PersonTruth]) -> Option<u32> {
 }
 
 /// Where a user who means a person would point: the middle of what is seen of them.
-pub fn pointed_at(person: &PersonTruth) -> Option<[f64; 2]> {
+pub fn pointed_at(people: &[PersonTruth], who: u32) -> Option<[f64; 2]> {
+    let person = people.iter().find(|person| person.id == who)?;
     person.visible.map(|seen| of_pixels(&seen).middle())
 }
 
@@ -110,6 +111,6 @@ mod tests {
         assert_eq!(followed(at(195.0), &people, 1), Followed::Wrong);
         assert_eq!(followed(at(300.0), &people, 1), Followed::Wrong);
         assert_eq!(followed(None, &people, 1), Followed::Nobody);
-        assert_eq!(pointed_at(&people[0]), Some([120.0, 70.0]));
+        assert_eq!(pointed_at(&people, 1), Some([120.0, 70.0]));
     }
 }

@@ -18,12 +18,16 @@ pub fn text(status: &Status) -> String {
     // Writing to a String can't fail.
     let _ = writeln!(
         out,
-        "{}  {}  localisation {}  map {} nodes, {} loops{}",
+        "{}  {}  localisation {}  map {} nodes, {} loops{}{}",
         status.platform,
         status.health,
         status.localisation,
         status.nodes,
         status.loops,
+        match &status.person {
+            Some(condition) => format!("  person {condition}"),
+            None => String::new(),
+        },
         match status.battery_percent {
             Some(percent) => format!("  battery {percent} %"),
             None => String::new(),

@@ -28,6 +28,24 @@ fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
     assert!(report["ate_rmse_m"].as_f64().unwrap() < 0.08, "{report}");
     assert_eq!(report["conditions"]["lost"], 0, "{report}");
 
+    // Its person is in view and followed all the while, and nobody else is.
+    let people = &report["people"];
+    assert!(
+        (35..=40).contains(&people["pictures"].as_u64().unwrap()),
+        "{people}"
+    );
+    assert!(
+        people["person"]["visible_s"].as_f64().unwrap() > 3.0,
+        "{people}"
+    );
+    assert!(
+        people["person"]["tracked_share"].as_f64().unwrap() > 0.8,
+        "{people}"
+    );
+    assert_eq!(people["person"]["wrong_s"], 0.0, "{people}");
+    let sheet = hachi::images::read(&out.join("people.png")).unwrap();
+    assert!(sheet.width > 3 * 424, "{}", sheet.width);
+
     // The figure of the report, measured once more from the files.
     let evaluated = program::run(&[
         "eval",

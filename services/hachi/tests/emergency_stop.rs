@@ -9,7 +9,7 @@ use hachi::config::{MotionInput, Settings};
 use hachi::service::emergency_stop::OpenBus;
 use hachi::service::settings::Platform;
 use hachi::service::signs::SharedSigns;
-use hachi::service::simulated::connect_with;
+use hachi::service::simulated::{Besides, connect_with};
 use hachi::service::simulator::Truth;
 use hachi::service::wiring::Running;
 use hachi_behaviour::Cause;
@@ -104,7 +104,10 @@ impl Rig {
             &clock,
             Running::VirtualTime,
             (slam, None),
-            Some(open),
+            Besides {
+                stop_bus: Some(open),
+                ..Besides::default()
+            },
         )
         .unwrap();
         let health = service.table.health().clone();

@@ -5,6 +5,11 @@ mod program;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use hachi::images::Rgb;
+use hachi::people_pictures::write_png;
+use hachi_realsense::frame::{Layout, YuyvImage};
+use hachi_world::SimulatedCamera;
+use hachi_world::scenes::Script;
 use program::{file, recording, run, text};
 
 /// One person who walks, as detections; the detector misses frames 10 to 12.
@@ -270,4 +275,100 @@ fn a_manifest_that_can_t_be_read_is_said() {
     let said = &failed.stderr;
     let named = ["model left out", "mine.toml", "abuot", "holds no detector"];
     assert!(named.iter().all(|part| said.contains(part)), "{said}");
+}
+
+/// Pictures of a simulated scene, one a file, as a camera's driver gives them.
+fn film(folder: &Path, frames: usize) {
+    let scene = Script::Return.scene(1);
+    let optics = scene.camera.geometry.color;
+    let mut camera = SimulatedCamera::new(&scene.simulation, scene.camera);
+    let mut pixels = vec![0; 3 * optics.pixels()];
+    for number in 1..=frames {
+        let frame = camera.next_color_frame().unwrap();
+        let layout = Layout::packed(optics.width, optics.height);
+        let image = YuyvImage::new(&frame.color, layout).unwrap();
+        image.to_rgb(&mut pixels).unwrap();
+        let picture = Rgb {
+            width: optics.width as usize,
+            height: optics.height as usize,
+            pixels: pixels.clone(),
+        };
+        write_png(&folder.join(format!("{number}.png")), &picture).unwrap();
+    }
+}
+
+#[test]
+fn frames_are_drawn_with_everybody_marked() {
+    let folder = tempfile::tempdir().unwrap();
+    let [frames, drawn] = ["frames", "drawn"].map(|name| folder.path().join(name));
+    std::fs::create_dir(&frames).unwrap();
+    film(&frames, 8);
+    let summary = run(&[
+        "people",
+        "track",
+        text(&frames),
+        "--detector",
+        "own:detector",
+        "--reid",
+        "own:reid",
+        "--out",
+        text(&folder.path().join("t.txt")),
+        "--pictures",
+        text(&drawn),
+        "--json",
+    ])
+    .json();
+    assert_eq!(summary["people"], 1, "{summary}");
+    let [before, first, last] = [
+        frames.join("8.png"),
+        drawn.join("000001.png"),
+        drawn.join("000008.png"),
+    ]
+    .map(|path| hachi::images::read(&path).unwrap());
+    // Nobody is believed in the first frame, but its number stands there; the last has a box too.
+    let changed = |picture: &Rgb| {
+        let pairs = picture.pixels.iter().zip(&before.pixels);
+        pairs.filter(|(a, b)| a.abs_diff(**b) > 60).count()
+    };
+    assert!(
+        changed(&last) > 2 * changed(&first),
+        "{} {}",
+        changed(&last),
+        changed(&first)
+    );
+    let sheet = hachi::images::read(&drawn.join("sheet.png")).unwrap();
+    assert!(sheet.width > 3 * 400 && sheet.height > 3 * 200 - 1);
+}
+
+#[test]
+fn a_scene_is_watched_and_its_person_known_to_all_three_ways() {
+    let report = run(&[
+        "eval",
+        "scenes",
+        "--scenes",
+        "return",
+        "--seconds",
+        "12",
+        "--json",
+    ])
+    .json();
+    let scene = &report["scenes"][0];
+    assert_eq!(scene["scene"], "return");
+    for way in ["track_alone", "follow_me", "carpe_id"] {
+        let figure = &scene[way];
+        // Picked after three seconds; the person walks about in plain sight.
+        let visible_s = figure["visible_s"].as_f64().unwrap();
+        assert!((8.0..9.2).contains(&visible_s), "{way}: {figure}");
+        assert!(
+            figure["tracked_share"].as_f64().unwrap() > 0.9,
+            "{way}: {figure}"
+        );
+        assert_eq!(figure["wrong_s"], 0.0, "{way}: {figure}");
+    }
+    let failed = run(&["eval", "scenes", "--scenes", "retrun"]);
+    assert!(
+        failed.stderr.contains("expected one of return, crossing"),
+        "{}",
+        failed.stderr
+    );
 }

@@ -5,7 +5,7 @@
 //! pipeline behind [`Observer::observe`](crate::observe::Observer::observe): both together take a
 //! camera's frame to what is known. Robots, recordings and simulated scenes go through the same two.
 
-use crate::identify::{AppearanceModel, Identifier, IdentifierConfig, PersonId, Status};
+use crate::identify::{AppearanceModel, Condition, Identifier, IdentifierConfig, PersonId, Status};
 use crate::observe::Observation;
 use crate::track::{Features, Frame, Track, Tracker, TrackerConfig};
 
@@ -88,6 +88,20 @@ impl Watch {
         self.identifier.statuses()
     }
 
+    /// Where a robot that follows this person goes now: nowhere while they are out of view, or while it
+    /// is unsure that it is them.
+    pub fn followed(&self, person: PersonId) -> Option<&Track> {
+        let status = self.statuses().find(|status| status.person == person)?;
+        let sure = matches!(status.condition, Condition::Seen | Condition::Found);
+        let track = self.tracks().iter().find(|t| Some(t.id) == status.track);
+        track.filter(|track| sure && track.is_seen())
+    }
+
+    /// What an enrolled person looks like by now.
+    pub fn model(&self, person: PersonId) -> Option<&AppearanceModel> {
+        self.identifier.model(person)
+    }
+
     /// Who is enrolled, to be changed.
     pub fn identifier(&mut self) -> &mut Identifier {
         &mut self.identifier
@@ -115,7 +129,6 @@ pub fn track_at(tracks: &[Track], [x, y]: [f64; 2]) -> Option<&Track> {
 mod tests {
     use super::*;
     use crate::BoundingBox;
-    use crate::identify::Condition;
     use crate::track::Detection;
 
     fn see(watch: &mut Watch, people: &[(f64, [f32; 2])]) -> Option<PersonId> {
@@ -150,7 +163,7 @@ mod tests {
         assert!(person.is_some());
         let status = *watch.statuses().next().unwrap();
         assert_eq!(status.condition, Condition::Seen);
-        let track = watch.tracks().iter().find(|t| Some(t.id) == status.track);
+        let track = watch.followed(status.person);
         assert!((track.unwrap().bounding_box().left - 200.0).abs() < 5.0);
     }
 

@@ -38,6 +38,7 @@ mod calendar;
 pub mod camera;
 mod campus;
 pub mod capture;
+mod cast;
 pub mod commanded;
 mod fan;
 pub mod floor;

@@ -2,10 +2,12 @@
 
 use std::f64::consts::PI;
 
-use crate::building::{glass_corridor, office, storey};
+use crate::building::{glass_corridor, office, office_people, storey};
 use crate::campus::{campus, large_campus};
+use crate::cast::Cast;
 use crate::material::Material;
 use crate::noise::{Purpose, generator};
+use crate::person::Person;
 use crate::scene::Scene;
 use crate::scene_builder::SceneBuilder;
 use crate::trajectory::{Gait, Trajectory, TrajectoryBuilder};
@@ -70,6 +72,18 @@ impl Preset {
     /// The preset of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
+    }
+
+    /// Who walks about in the world of a seed: in the office the robot's person, who walks ahead of
+    /// it, and three who come towards it; nobody elsewhere.
+    pub fn people(self, seed: u64) -> Vec<Person> {
+        if self != Self::Office {
+            return Vec::new();
+        }
+        let robot = self.world(seed).trajectory;
+        let mut cast = Cast::new(generator(seed, Purpose::People, u64::MAX));
+        let mut random = generator(seed, Purpose::Scene, 0);
+        office_people(&mut random, &robot, &mut cast)
     }
 
     /// The world of a seed; another seed gives another layout.

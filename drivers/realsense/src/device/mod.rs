@@ -12,6 +12,7 @@ mod lane;
 mod link;
 mod session;
 mod setup;
+pub mod simulated;
 mod times;
 #[cfg(all(feature = "v4l2", target_os = "linux", target_pointer_width = "64"))]
 pub mod v4l2;

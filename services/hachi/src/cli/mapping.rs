@@ -40,6 +40,9 @@ pub struct DemoArguments {
     /// robot that the service drives.
     #[arg(long, value_name = "FILE", conflicts_with = "scripted")]
     pub record: Option<PathBuf>,
+    /// Nobody walks about in the building, and the robot has no camera.
+    #[arg(long)]
+    pub nobody: bool,
     /// How far through the pipeline to go.
     #[arg(long, value_enum, default_value_t = StageArgument::Slam)]
     pub stage: StageArgument,

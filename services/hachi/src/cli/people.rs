@@ -5,6 +5,7 @@ pub mod enrolled;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use hachi_inference::Own;
 use hachi_world::scenes::Script;
 
 /// What can be done about people.
@@ -32,7 +33,7 @@ pub enum People {
 }
 
 /// Which networks to use.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct NetworkArguments {
     /// Folder of ONNX models with their manifests [default: HACHI_MODELS, else models in HACHI_DATA].
     #[arg(long, value_name = "DIR")]
@@ -43,6 +44,27 @@ pub struct NetworkArguments {
     /// The network that tells people apart [default: the first one in the folder].
     #[arg(long, value_name = "FILE.onnx")]
     pub reid: Option<PathBuf>,
+}
+
+impl NetworkArguments {
+    /// The two that are part of the program: for the simulated world, which is all they have seen.
+    pub fn own() -> Self {
+        let named = |own: Own| Some(PathBuf::from(own.name()));
+        Self {
+            models: None,
+            detector: named(Own::Detector),
+            reid: named(Own::ReId),
+        }
+    }
+
+    /// These, or the program's own where none is named.
+    #[must_use]
+    pub fn or_own(&self) -> Self {
+        match (&self.models, &self.detector, &self.reid) {
+            (None, None, None) => Self::own(),
+            _ => self.clone(),
+        }
+    }
 }
 
 /// Arguments of `hachi people track`.
@@ -69,6 +91,9 @@ pub struct PeopleTrackArguments {
     /// Frames a second [default: what seqinfo.ini beside them says, else 10].
     #[arg(long, value_name = "N", value_parser = frames_per_second)]
     pub fps: Option<f64>,
+    /// Draw every frame with everybody marked into this folder, and some of them on one sheet.png.
+    #[arg(long, value_name = "DIR", conflicts_with = "detections")]
+    pub pictures: Option<PathBuf>,
     /// The networks for frames.
     #[command(flatten)]
     pub networks: NetworkArguments,
@@ -130,7 +155,8 @@ pub struct EvalTracksArguments {
 Simulated people walk, cross, leave, come back and change their clothes for two to three minutes a \
 scene. One of them is picked after three seconds; from then on it is measured for how much of the time \
 in view they are followed, how often and how soon they are known again, and for how long somebody else \
-is followed: by the track alone, by FollowMe's calibration, by CARPE-ID, on the same tracks. Scenes: \
+is followed: by the track alone, by FollowMe's calibration, by CARPE-ID, on the same tracks. Unless \
+others are named, the networks are the program's own, which know the simulated world alone. Scenes: \
 return, crossing, jacket, wardrobe, similar, twin, light, crowd, far, turning.
 
 Example:
@@ -142,6 +168,9 @@ pub struct EvalScenesArguments {
     /// Who plays, in which clothes, and where exactly.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Only so much of each scene, seconds [default: all of it].
+    #[arg(long, value_name = "S", value_parser = super::seconds)]
+    pub seconds: Option<f64>,
     /// Draw twelve frames of each scene with everybody marked, NAME.png, into this folder.
     #[arg(long, value_name = "DIR")]
     pub pictures: Option<PathBuf>,

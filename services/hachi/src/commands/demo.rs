@@ -2,6 +2,7 @@
 //! truth.
 
 mod driven;
+mod people;
 mod scripted;
 
 use hachi_hal::Vector3;
@@ -17,8 +18,13 @@ use crate::interrupt::Cancelled;
 use crate::map_builder::MapBuilder;
 use crate::mapping::{Ended, state_of};
 use crate::output;
+use crate::people_pictures::ContactSheet;
 use crate::report::{Report, RunState};
 use crate::results::Results;
+use people::PeopleReport;
+
+/// Frames of the walk with everybody marked.
+const PEOPLE: &str = "people.png";
 
 /// The VLP-16 turns ten times a second.
 const SCANS_PER_SECOND: f64 = 10.0;
@@ -44,6 +50,9 @@ struct DemoReport {
     /// The robot that the service drove; absent where it followed a fixed walk.
     #[serde(skip_serializing_if = "Option::is_none")]
     robot: Option<&'static str>,
+    /// Who was seen; absent where nobody was looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    people: Option<PeopleReport>,
 }
 
 /// What a walk left.
@@ -58,6 +67,7 @@ struct Walked {
     report: Report,
     ended: Ended,
     robot: Option<&'static str>,
+    people: Option<(PeopleReport, Option<ContactSheet>)>,
 }
 
 /// Runs the command.
@@ -79,6 +89,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         Err(failure) => return Err(failure),
     };
     let written = write_all(&results, &walked, &measured);
+    let people = walked.people.map(|(told, _)| told);
     let mut report = walked.report;
     if written.is_err() {
         report.state = RunState::OutputFailed;
@@ -98,6 +109,7 @@ pub fn run(arguments: &DemoArguments) -> Result<(), Failure> {
         z_rmse_m: height_error(&measured),
         true_path_length_m: walked.truth.path_length_m(),
         robot: walked.robot,
+        people,
         report,
     };
     written.and(crate::report::write_json(
@@ -167,7 +179,13 @@ fn write_all(results: &Results, walked: &Walked, measured: &Evaluation) -> Resul
         errors_m: Some(&measured.errors_m),
         links: &walked.loop_lines,
     };
+    let sheet = walked
+        .people
+        .as_ref()
+        .and_then(|(_, sheet)| sheet.as_ref())
+        .map_or(Ok(()), |sheet| sheet.write(&results.path(PEOPLE)));
     first_failure([
+        sheet,
         results.trajectory("trajectory.tum", trajectory),
         results.trajectory("odometry.tum", &walked.odometry),
         results.trajectory("truth.tum", &walked.truth),
@@ -184,12 +202,17 @@ fn summary(demo: &DemoReport, map_points: usize, results: &Results) -> String {
         Some(robot) => format!("a {robot} driven by the service"),
         None => "a walking robot".to_owned(),
     };
+    let people = demo.people.as_ref().map(seen).unwrap_or_default();
+    let pictures = match &demo.people {
+        Some(_) => format!(", {}", results.path(PEOPLE).display()),
+        None => String::new(),
+    };
     format!(
         "{} on {robot}, {} building {}: {} scans, {:.1} s, {:.1} m\n\
          error against the truth {:.1} cm rmse, {:.1} cm at most; {:.1} cm rmse by odometry alone\n\
          {:.1} ms a scan in the mean, {:.1} ms at the 99th percentile, {} threads\n\
          condition OK {}, DEGRADED {}, LOST {}; {} of {} loop candidates closed\n\
-         look at {} and {} ({map_points} points)",
+         {people}look at {}{pictures} and {} ({map_points} points)",
         demo.sensor,
         demo.world,
         demo.seed,
@@ -210,4 +233,30 @@ fn summary(demo: &DemoReport, map_points: usize, results: &Results) -> String {
         results.path("trajectory.svg").display(),
         results.path("map.ply").display(),
     )
+}
+
+/// Who was seen, in a line or two.
+fn seen(people: &PeopleReport) -> String {
+    let tracks: Vec<_> = people.tracks.iter().map(u64::to_string).collect();
+    let mut text = format!(
+        "{} people seen in {} pictures, as tracks {}\n",
+        people.truly_seen,
+        people.pictures,
+        tracks.join(", ")
+    );
+    if let Some(person) = &people.person {
+        text += &format!(
+            "its person, P{}, is {}: followed for {:.1} of {:.1} s in view ({:.0} %), known again {} of \
+             {} times; somebody else followed for {:.1} s\n",
+            person.id,
+            person.condition,
+            person.tracked_s,
+            person.visible_s,
+            100.0 * person.tracked_share,
+            person.re_identified,
+            person.re_identifications_needed,
+            person.wrong_s,
+        );
+    }
+    text
 }

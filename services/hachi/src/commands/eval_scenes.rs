@@ -8,16 +8,17 @@ use std::time::{Duration, Instant};
 
 use hachi_inference::ImageView;
 use hachi_people::BoundingBox;
-use hachi_people::followed::{Score, ScoreKeeper};
-use hachi_people::identify::{AppearanceModel, Calibration, Condition, IdentifierConfig, Status};
+use hachi_people::followed::{Followed, Score, ScoreKeeper, Sight};
+use hachi_people::identify::{AppearanceModel, Calibration, IdentifierConfig};
 use hachi_people::observe::{Observation, Observer};
 use hachi_people::track::Track;
 use hachi_people::watch::Watch;
 use hachi_realsense::frame::{Layout, YuyvImage};
+use hachi_world::SimulatedCamera;
 use hachi_world::scenes::{Script, ScriptedScene};
-use hachi_world::{CameraFrame, SimulatedCamera};
 use rayon::prelude::*;
 use serde::Serialize;
+use tracing::debug;
 
 use crate::cli::people::EvalScenesArguments;
 use crate::exit::Failure;
@@ -121,16 +122,22 @@ pub fn run(arguments: &EvalScenesArguments) -> Result<(), Failure> {
         false => arguments.scenes.clone(),
     };
     let cancelled = Cancelled::on_interrupt()?;
-    let total_s: f64 = scripts
+    let scene = |script: &Script| {
+        let mut scene = script.scene(arguments.seed);
+        let lasts_s = &mut scene.simulation.duration_s;
+        *lasts_s = arguments.seconds.map_or(*lasts_s, |most| lasts_s.min(most));
+        scene
+    };
+    let lasting = scripts
         .iter()
-        .map(|script| script.scene(arguments.seed).simulation.duration_s)
-        .sum();
+        .map(|script| scene(script).simulation.duration_s);
+    let total_s: f64 = lasting.sum();
     let bar = progress::bar(Some((total_s * 10.0) as u64), "frames");
     let watched: Vec<(Script, Watched)> = scripts
         .par_iter()
         .map(|script| {
-            let observer = networks::observer(&arguments.networks)?;
-            let mut run = SceneRun::new(script.scene(arguments.seed), observer);
+            let observer = networks::observer(&arguments.networks.or_own())?;
+            let mut run = SceneRun::new(scene(script), observer);
             if arguments.pictures.is_some() {
                 run.draw();
             }
@@ -263,7 +270,7 @@ impl SceneRun {
         let at_s = frame.stamp.secs_since(self.scene.simulation.start);
         let user_points = self.picked.is_none() && at_s >= self.scene.picked_at_s;
         if let Some(at) = user_points
-            .then(|| target_at(frame, self.scene.target))
+            .then(|| people_truth::pointed_at(&frame.people, self.scene.target))
             .flatten()
         {
             self.watch.pick(at);
@@ -285,14 +292,29 @@ impl SceneRun {
             let boxes = [
                 seen(tracks, self.picked).map(Track::bounding_box),
                 self.follow_me.step(tracks, &observed, self.picked),
-                followed(tracks, status.as_ref()).map(Track::bounding_box),
+                status
+                    .and_then(|status| self.watch.followed(status.person))
+                    .map(Track::bounding_box),
             ];
             let target = self.scene.target;
             let person = frame.people.iter().find(|person| person.id == target);
             let sight = people_truth::sight(person, color.width);
-            for (keeper, followed) in self.keepers.iter_mut().zip(boxes) {
-                let followed = people_truth::followed(followed, &frame.people, target);
+            let right = boxes.map(|b| people_truth::followed(b, &frame.people, target));
+            for (keeper, followed) in self.keepers.iter_mut().zip(right) {
                 keeper.step(dt_s, sight, followed);
+            }
+            if right[2] == Followed::Wrong || (sight, right[2]) == (Sight::Clear, Followed::Nobody)
+            {
+                let person = person.map(|person| (person.visible, person.visible_share()));
+                debug!(at_s, ?right, ?person, ?status, detections = ?observed.detections);
+                for track in tracks {
+                    let looks = track.detection.and_then(|d| observed.features?.get(d));
+                    let model = status.and_then(|status| self.watch.model(status.person));
+                    let distance = looks.zip(model).map(|(looks, model)| model.distance(looks));
+                    let threshold = model.map(AppearanceModel::threshold);
+                    let b = track.bounding_box();
+                    debug!(id = track.id, ?track.state, ?b, ?distance, ?threshold);
+                }
             }
         }
         if let Some(sheet) = &mut self.sheet {
@@ -305,7 +327,7 @@ impl SceneRun {
                     found: self.observer.found(),
                     caption: &format!("{at_s:.1} S"),
                 };
-                sheet.push(annotate(&image, &labels));
+                sheet.push(&annotate(&image, &labels));
             }
         }
         Ok(true)
@@ -358,20 +380,6 @@ impl FollowMe {
 fn seen(tracks: &[Track], id: Option<u64>) -> Option<&Track> {
     let track = tracks.iter().find(|track| Some(track.id) == id);
     track.filter(|track| track.is_seen())
-}
-
-/// Who is followed where a status says so. One that is unsure follows nobody.
-fn followed<'a>(tracks: &'a [Track], status: Option<&Status>) -> Option<&'a Track> {
-    let status = status?;
-    match status.condition {
-        Condition::Seen | Condition::Found => seen(tracks, status.track),
-        _ => None,
-    }
-}
-
-fn target_at(frame: &CameraFrame, target: u32) -> Option<[f64; 2]> {
-    let person = frame.people.iter().find(|person| person.id == target)?;
-    people_truth::pointed_at(person)
 }
 
 fn text(report: &Report) -> String {

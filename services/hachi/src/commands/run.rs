@@ -31,6 +31,7 @@ use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::recorder::Recorder;
 use crate::service::emergency_stop::OpenBus;
+use crate::service::eyes;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
 use crate::service::web::{self, Page};
@@ -59,6 +60,7 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
     if recording.is_some() {
         settings.patrol.places.clear();
         settings.service.map = None;
+        settings.people.enabled = false;
     }
     let clock = SystemClock::new();
     let config = platform.client(&settings.robot);
@@ -73,6 +75,7 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
             LidarKind::Vlp16 => Sensor::Velodyne,
             LidarKind::Helios16p => Sensor::Robosense,
         },
+        eyes: eyes::of_this_computer(&settings, clock),
         stop_bus: stop_bus(&settings)?,
     };
     let listen = settings.service.listen;

@@ -126,6 +126,7 @@ impl<L: RobotLink> BaseCommandTask<L> {
         };
         self.obstacles = self.around.newest().or(self.obstacles);
         self.wish = self.wishes.newest().or(self.wish);
+        self.sight.camera = self.signs.camera.get();
         self.sight.event_loop = self.signs.event_loop.get();
         self.sight.task_overrun = self.halt.is_asked_for();
     }

@@ -4,8 +4,11 @@
 use std::time::Instant;
 
 use hachi_cloud::Filtered;
-use hachi_hal::{Point, Pose, ScanHeader};
+use hachi_hal::{Point, Pose, ScanHeader, Stamp};
 use hachi_odometry::Estimate;
+use hachi_people::detect::Found;
+use hachi_people::observe::Observation;
+use hachi_people::track::{Detection, Features};
 use hachi_runtime::{Receiver, Sender, TaskTable, WhenFull, bounded};
 
 /// Points of a scan that boxes have room for from the beginning: a VLP-16's turn.
@@ -46,6 +49,60 @@ pub struct Placed {
     pub points: Vec<Point>,
     /// When work on the scan began.
     pub begun: Option<Instant>,
+}
+
+/// A colour picture.
+#[derive(Debug, Default)]
+pub struct Picture {
+    /// The middle of its exposure.
+    pub stamp: Stamp,
+    /// Pixels.
+    pub width: usize,
+    /// Pixels.
+    pub height: usize,
+    /// Red, green, blue, row by row.
+    pub rgb: Vec<u8>,
+}
+
+/// A picture that was looked at.
+#[derive(Debug, Default)]
+pub struct Looked {
+    /// The picture.
+    pub picture: Picture,
+    /// What was found in it, with masks, in the order of the detections.
+    pub found: Vec<Found>,
+    detections: Vec<Detection>,
+    /// Numbers in a feature; 0 where no network tells people apart.
+    dimension: usize,
+    features: Vec<f32>,
+    same_person_distance: f64,
+}
+
+impl Looked {
+    /// Keeps an observation.
+    pub fn keep(&mut self, observed: &Observation<'_>) {
+        self.detections.clear();
+        self.detections.extend_from_slice(observed.detections);
+        self.features.clear();
+        self.dimension = 0;
+        if let Some(features) = observed.features {
+            self.dimension = features.dimension;
+            self.features.extend_from_slice(features.values);
+            self.same_person_distance = features.same_person_distance;
+        }
+    }
+
+    /// What was kept.
+    pub fn observation(&self) -> Observation<'_> {
+        Observation {
+            detections: &self.detections,
+            features: (self.dimension > 0).then_some(Features {
+                dimension: self.dimension,
+                values: &self.features,
+                same_person_distance: self.same_person_distance,
+            }),
+        }
+    }
 }
 
 /// How the odometry's frame lies on the map, and whether to be trusted.
@@ -148,5 +205,18 @@ impl Roomy for Placed {
             points: Vec::with_capacity(points),
             ..Self::default()
         }
+    }
+}
+
+/// Pictures make room for themselves: how large they are, the camera says.
+impl Roomy for Picture {
+    fn with_room(_: usize) -> Self {
+        Self::default()
+    }
+}
+
+impl Roomy for Looked {
+    fn with_room(_: usize) -> Self {
+        Self::default()
     }
 }

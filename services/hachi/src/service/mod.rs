@@ -1,7 +1,7 @@
 //! The service: a robot's sensors and base, and the tasks between them. Read [`wiring`] first: it is
 //! the flow.
 //!
-//! In: packets of the LiDAR and states of the robot, from sockets or from the simulated robot. Out:
+//! In: packets of the LiDAR, states of the robot, pictures of a camera, from sockets and USB or from the simulated robot. Out:
 //! a map, a place on it, commands that passed the gate, health and telemetry. The same tasks run by
 //! threads (`hachi run`) and in virtual time (`hachi demo`).
 //!
@@ -14,19 +14,25 @@
 //! | [`filter`] | `filter`: obstacles first, then which points are kept | a scan |
 //! | [`odometry`] | `odometry`: where the scan was | a filtered scan |
 //! | [`slam`] | `slam`: nodes, loops, the map | a placed scan |
+//! | [`camera`] | `camera receive`: pictures; where people are looked for | 10 ms |
+//! | [`detection`] | `detection`: who is in a picture, what they look like | a picture |
+//! | [`tracking`] | `tracking`: who is where, whom the robot knows | a picture that was looked at |
 //! | [`behaviour`] | `behaviour`: the patrol | 50 ms |
 //! | [`record`] | `recorder`: what sensors sent, to a file; where one is wanted | 50 ms |
 //! | [`supervisor`] | `supervisor`: what is stale, what is wrong | 50 ms |
 //!
 //! [`messages`] is what passes between them, [`signs`] what each leaves for whoever asks, [`rows`]
-//! the table's numbers, [`settings`] the file they come from, [`simulator`] the other side of the
+//! the table's numbers, [`settings`] the file they come from, [`eyes`] camera and networks, [`simulator`] the other side of the
 //! wire, [`web`] what is told over HTTP.
 
 pub mod base;
 pub mod behaviour;
 pub mod body;
+pub mod camera;
 pub mod crew;
+pub mod detection;
 pub mod emergency_stop;
+pub mod eyes;
 pub mod filter;
 pub mod legs;
 pub mod lidar;
@@ -40,5 +46,6 @@ pub mod simulated;
 pub mod simulator;
 pub mod slam;
 pub mod supervisor;
+pub mod tracking;
 pub mod web;
 pub mod wiring;

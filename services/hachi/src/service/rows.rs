@@ -7,13 +7,18 @@
 
 use hachi_runtime::{Overrun, TaskSpec, Trigger};
 
-use super::{filter, slam};
+use super::{detection, filter, slam};
 
 const MS: i64 = 1_000_000;
 
 /// From one scan to the next: ten turns a second.
 const SCAN: Trigger = Trigger::Input {
     shortest_ns: 100 * MS,
+};
+
+/// From one picture to the next: thirty a second.
+const PICTURE: Trigger = Trigger::Input {
+    shortest_ns: 33 * MS,
 };
 
 const fn every(period_ms: i64) -> Trigger {
@@ -89,8 +94,14 @@ pub const FILTER: TaskSpec = with_ladder(
 /// Where a scan was.
 pub const ODOMETRY: TaskSpec = parallel(hard(row("odometry", SCAN, 45_000, 45), Overrun::Skip));
 
+/// Pictures wait in the camera's own buffers: four, a tenth of a second.
+pub const CAMERA_RECEIVE: TaskSpec = row("camera receive", every(10), 5_000, 43);
+
 /// Wishes.
 pub const BEHAVIOUR: TaskSpec = row("behaviour", every(50), 1_000, 40);
+
+/// Who is where.
+pub const TRACKING: TaskSpec = row("tracking", PICTURE, 2_000, 38);
 
 /// Nodes, loops, the map.
 pub const SLAM: TaskSpec = with_ladder(
@@ -101,11 +112,21 @@ pub const SLAM: TaskSpec = with_ladder(
     slam::LADDER,
 );
 
+/// Who is in a picture: the networks of the program on one core, with time left for everything that
+/// goes first.
+pub const DETECTION: TaskSpec = with_ladder(
+    TaskSpec {
+        overrun: Overrun::Degrade,
+        ..row("detection", PICTURE, 30_000, 15)
+    },
+    detection::LADDER,
+);
+
 /// What sensors sent, to a file.
 pub const RECORDER: TaskSpec = row("recorder", every(50), 20_000, 10);
 
 /// The tasks of a service, in the order of the table.
-pub const ALL: [TaskSpec; 10] = [
+pub const ALL: [TaskSpec; 13] = [
     BASE_COMMAND,
     EMERGENCY_STOP,
     LIDAR_RECEIVE,
@@ -113,8 +134,11 @@ pub const ALL: [TaskSpec; 10] = [
     SUPERVISOR,
     FILTER,
     ODOMETRY,
+    CAMERA_RECEIVE,
     BEHAVIOUR,
+    TRACKING,
     SLAM,
+    DETECTION,
     RECORDER,
 ];
 

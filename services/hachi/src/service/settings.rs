@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use hachi_b1::B1;
 use hachi_canbus::stop_node::{NODES, StopNodeConfig};
 use hachi_go1::GO1;
+use hachi_people::identify::IdentifierConfig;
 use hachi_runtime::{Overrun, TaskSpec, Trigger};
 use hachi_unitree::Quadruped;
 use hachi_unitree::command::CommanderConfig;
@@ -75,6 +76,47 @@ impl LidarConfig {
             false => self.ports.clone(),
         }
     }
+}
+
+/// The depth camera, a RealSense.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraConfig {
+    /// Its serial number on the USB; any camera if unset.
+    pub serial: Option<String>,
+    /// Columns of both pictures.
+    pub width: u32,
+    /// Their rows.
+    pub height: u32,
+    /// How often it takes them.
+    pub frames_per_second: u32,
+}
+
+impl Default for CameraConfig {
+    fn default() -> Self {
+        Self {
+            serial: None,
+            width: 640,
+            height: 360,
+            frames_per_second: 15,
+        }
+    }
+}
+
+/// People in the camera's sight.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PeopleConfig {
+    /// Whether they are looked for. The camera is opened then.
+    pub enabled: bool,
+    /// The network that finds them.
+    pub detector: Option<PathBuf>,
+    /// The network that tells them apart.
+    pub reid: Option<PathBuf>,
+    /// Who is known (`hachi people enrol`).
+    pub store: Option<PathBuf>,
+    /// How they are known again.
+    pub identify: IdentifierConfig,
 }
 
 /// An emergency stop of its own on a CAN bus, besides the remote control's.
@@ -252,6 +294,27 @@ pub fn check(settings: &Settings) -> Result<(), Unworkable> {
             let what = format!("{} can't work", row.priority.unwrap_or_default());
             return Err(unworkable(key("priority"), what, "give 1 to 99"));
         }
+    }
+    let camera = &settings.camera;
+    for (key, value, range) in [
+        ("camera.width", camera.width, 2..=1920),
+        ("camera.height", camera.height, 2..=1080),
+        ("camera.frames_per_second", camera.frames_per_second, 1..=90),
+    ] {
+        if !range.contains(&value) {
+            let next_step = format!("give {} to {}", range.start(), range.end());
+            return Err(unworkable(
+                key.to_owned(),
+                format!("{value} can't work"),
+                &next_step,
+            ));
+        }
+    }
+    let lost_s = settings.people.identify.lost_s;
+    if !(0.0..=3600.0).contains(&lost_s) {
+        let what = format!("{lost_s} can't work");
+        let key = "people.identify.lost_s".to_owned();
+        return Err(unworkable(key, what, "give 0 to 3600 s"));
     }
     let patrol = &settings.patrol;
     let speeds = [

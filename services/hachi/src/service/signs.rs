@@ -39,32 +39,48 @@ impl Mark {
     }
 }
 
-/// A word that changes.
-#[derive(Debug, Default)]
-pub struct Word(AtomicU8);
+/// A word that changes, one of few.
+#[derive(Debug)]
+pub struct Word {
+    words: &'static [&'static str],
+    index: AtomicU8,
+}
 
-/// Conditions of localisation, by their number in a [`Word`].
-const CONDITIONS: [&str; 5] = ["UNKNOWN", "OK", "DEGRADED", "LOST", "RECOVERING"];
+/// Conditions of localisation.
+const PLACE_CONDITIONS: &[&str] = &["UNKNOWN", "OK", "DEGRADED", "LOST", "RECOVERING"];
+
+/// Conditions of a person; nothing where the robot knows nobody.
+const PERSON_CONDITIONS: &[&str] = &["", "SEEN", "FOUND", "UNSURE", "LOST", "SEARCHING"];
 
 impl Word {
-    /// Sets the word; one that is none of the conditions is `UNKNOWN`.
+    const fn of(words: &'static [&'static str]) -> Self {
+        Self {
+            words,
+            index: AtomicU8::new(0),
+        }
+    }
+
+    /// Sets the word; one that is none of them is the first.
     pub fn set(&self, name: &str) {
-        let index = CONDITIONS.iter().position(|c| *c == name).unwrap_or(0);
-        self.0.store(index as u8, Ordering::Relaxed);
+        let index = self.words.iter().position(|word| *word == name);
+        self.index
+            .store(index.unwrap_or(0) as u8, Ordering::Relaxed);
     }
 
     /// The word.
     pub fn get(&self) -> &'static str {
-        let index = usize::from(self.0.load(Ordering::Relaxed));
-        CONDITIONS.get(index).copied().unwrap_or(CONDITIONS[0])
+        let index = usize::from(self.index.load(Ordering::Relaxed));
+        self.words.get(index).copied().unwrap_or(self.words[0])
     }
 }
 
 /// What all tasks leave.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Signs {
     /// The end of the last scan.
     pub scan: Mark,
+    /// The last picture.
+    pub camera: Mark,
     /// The robot's last new state.
     pub robot: Mark,
     /// When the emergency stop's node was last well: heard, in operation, its contacts agreeing.
@@ -82,10 +98,42 @@ pub struct Signs {
     pub store_fails: AtomicBool,
     /// Whether the recording can't be written.
     pub recording_fails: AtomicBool,
+    /// A network that was asked for is not there, or is none.
+    pub model_missing: AtomicBool,
+    /// A network gave no answer to the last picture.
+    pub network_fails: AtomicBool,
+    /// How many people are in view.
+    pub people_in_view: AtomicU32,
+    /// What is known of the first person whom the robot knows.
+    pub person: Word,
     /// Commands that were cut to a limit.
     pub limited: AtomicU64,
     /// Charge of the battery, per cent; 0 while it is unknown.
     pub battery_percent: AtomicU32,
+}
+
+impl Default for Signs {
+    fn default() -> Self {
+        Self {
+            scan: Mark::default(),
+            camera: Mark::default(),
+            robot: Mark::default(),
+            event_loop: Mark::default(),
+            stop_node: Mark::default(),
+            condition: Word::of(PLACE_CONDITIONS),
+            causes: AtomicU32::default(),
+            loops: AtomicU64::default(),
+            nodes: AtomicU64::default(),
+            store_fails: AtomicBool::default(),
+            recording_fails: AtomicBool::default(),
+            model_missing: AtomicBool::default(),
+            network_fails: AtomicBool::default(),
+            people_in_view: AtomicU32::default(),
+            person: Word::of(PERSON_CONDITIONS),
+            limited: AtomicU64::default(),
+            battery_percent: AtomicU32::default(),
+        }
+    }
 }
 
 /// The signs, shared.

@@ -5,15 +5,22 @@
 //! (`hachi_runtime::executor`).
 
 use hachi_bridge::message::Sensor;
+use hachi_hal::Intrinsics;
+use hachi_realsense::device::StreamFormat;
+use hachi_realsense::device::simulated::SimulatedPort;
+use hachi_realsense::{RealSense, RealSenseConfig};
 use hachi_runtime::{Overrun, TaskClock, TaskSpec, Trigger, VirtualClock};
 use hachi_slam::Slam;
 use hachi_unitree::device::{HighClient, MemoryLink, SimulatedRobotConfig, SimulatedService};
-use hachi_world::{LiveLidar, SensorKind, SimulationConfig};
+use hachi_world::{CameraConfig, LiveLidar, SensorKind, SimulatedCamera, SimulationConfig};
 
+use super::camera::ColorOf;
 use super::emergency_stop::OpenBus;
 use super::settings::Platform;
-use super::simulator::{MemoryPackets, SimulatorTask, Truth, WalkingBody};
-use super::wiring::{Devices, Running, Service, assemble};
+use super::simulator::{
+    MemoryPackets, SeenPeople, SimulatedEye, SimulatorTask, Truth, WalkingBody,
+};
+use super::wiring::{Devices, Eyes, Running, Service, Watcher, assemble};
 use crate::config::Settings;
 use crate::exit::Failure;
 use crate::recorder::Recorder;
@@ -41,6 +48,54 @@ pub fn sensor_of(world: &SimulationConfig) -> Sensor {
     }
 }
 
+/// What not every robot has.
+#[derive(Default)]
+pub struct Besides {
+    /// A camera.
+    pub people: Option<Spectacle>,
+    /// An emergency stop's node on a bus.
+    pub stop_bus: Option<OpenBus>,
+}
+
+/// A camera on the simulated robot, and who sees what it sees.
+pub struct Spectacle {
+    /// The camera.
+    pub camera: CameraConfig,
+    /// Its cable.
+    pub port: SimulatedPort,
+    /// The networks, and who watches.
+    pub watcher: Watcher,
+    /// Who is truly seen.
+    pub seen: SeenPeople,
+}
+
+impl Spectacle {
+    /// The service's end of the cable, and the camera's.
+    fn open(self, world: &SimulationConfig) -> (Eyes, SimulatedEye) {
+        let geometry = self.camera.geometry;
+        let rate = (1_000_000_000 / self.camera.period_ns.max(1)) as u32;
+        let format = |o: &Intrinsics| StreamFormat::new(o.width, o.height, rate);
+        let config = RealSenseConfig {
+            depth: format(&geometry.depth),
+            color: format(&geometry.color),
+            ..RealSenseConfig::default()
+        };
+        let driver = RealSense::new(self.port.clone(), config);
+        let pixels = [geometry.depth.pixels(), geometry.color.pixels()];
+        let eyes = Eyes {
+            camera: Box::new(ColorOf::new(driver, pixels[0], pixels[1])),
+            people: Some(self.watcher),
+            model_missing: false,
+        };
+        let eye = SimulatedEye {
+            camera: SimulatedCamera::new(world, self.camera),
+            port: self.port,
+            seen: self.seen,
+        };
+        (eyes, eye)
+    }
+}
+
 /// The service on one end of the wires, the simulated robot on the other; and where that truly is.
 ///
 /// # Errors
@@ -53,10 +108,18 @@ pub fn connect(
     running: Running,
     kept: (Slam, Option<Recorder>),
 ) -> Result<(Service, Truth), Failure> {
-    connect_with(settings, platform, world, clock, running, kept, None)
+    connect_with(
+        settings,
+        platform,
+        world,
+        clock,
+        running,
+        kept,
+        Besides::default(),
+    )
 }
 
-/// As [`connect`], with an emergency stop's node on a bus.
+/// As [`connect`], with what a robot may have besides.
 ///
 /// # Errors
 /// As there.
@@ -67,7 +130,7 @@ pub fn connect_with(
     clock: &VirtualClock,
     running: Running,
     (slam, recorder): (Slam, Option<Recorder>),
-    stop_bus: Option<OpenBus>,
+    besides: Besides,
 ) -> Result<(Service, Truth), Failure> {
     let link = MemoryLink::new(clock.clone());
     let packets = MemoryPackets::default();
@@ -75,12 +138,14 @@ pub fn connect_with(
     let robot = platform.robot;
     let client = HighClient::over(robot, platform.client(&settings.robot), link.clone())
         .map_err(|error| Failure::new(error, "please report this"))?;
+    let (eyes, eye) = besides.people.map(|people| people.open(world)).unzip();
     let devices = Devices {
+        eyes,
         platform: *platform,
         client,
         packets: packets.clone(),
         sensor: sensor_of(world),
-        stop_bus,
+        stop_bus: besides.stop_bus,
     };
     let tasks = TaskClock::new(clock.clone());
     let mut service = assemble(settings, devices, slam, tasks, running, recorder)?;
@@ -92,6 +157,7 @@ pub fn connect_with(
         lidar: LiveLidar::new(world.clone()),
         packets,
         truth: truth.clone(),
+        eye,
     };
     let table = &mut service.table;
     table.add(SIMULATOR, table.bell(), vec![], Box::new(simulator));

@@ -7,14 +7,15 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use hachi_hal::{PacketSource, Pose, Received, Stamp, Vector3};
+use hachi_realsense::device::simulated::SimulatedPort;
 use hachi_runtime::{Progress, VirtualClock, Work};
 use hachi_unitree::device::{KinematicBody, MemoryLink, RobotBody, SimulatedService};
 use hachi_unitree::frame::{HighCmd, HighState, MOTOR_SERVO, Model};
 use hachi_world::legs::{Footfall, ForceSensors, LegSensorConfig, SlipConfig};
 use hachi_world::motion::BodyMotion;
 use hachi_world::{
-    CommandedBody, LegDimensions, LegsConfig, LiveLidar, SimulatedLidarError, SimulationConfig,
-    Trajectory,
+    CommandedBody, LegDimensions, LegsConfig, LiveLidar, PersonTruth, SimulatedCamera,
+    SimulatedLidarError, SimulationConfig, Trajectory,
 };
 
 use super::settings::Platform;
@@ -230,6 +231,70 @@ pub struct SimulatorTask {
     pub packets: MemoryPackets,
     /// The truth.
     pub truth: Truth,
+    /// The camera at its front, where there is one.
+    pub eye: Option<SimulatedEye>,
+}
+
+/// The camera at the robot's front, on a cable inside the program.
+pub struct SimulatedEye {
+    /// What it sees.
+    pub camera: SimulatedCamera,
+    /// The other end of its cable.
+    pub port: SimulatedPort,
+    /// Who it truly saw.
+    pub seen: SeenPeople,
+}
+
+/// A picture's time, and who is in it.
+type Seen = (Stamp, Vec<PersonTruth>);
+
+/// Who the camera truly saw in its last pictures.
+#[derive(Debug, Clone, Default)]
+pub struct SeenPeople(Arc<Mutex<VecDeque<Seen>>>);
+
+/// So many are kept: more than wait between camera and tracking.
+const SEEN_KEPT: usize = 16;
+
+impl SeenPeople {
+    /// Who was seen in the picture that was taken at about this time: the driver knows it to a few
+    /// milliseconds.
+    pub fn at(&self, stamp: Stamp) -> Option<Vec<PersonTruth>> {
+        let seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let off = |(at, _): &&Seen| at.nanos_since(stamp).abs();
+        seen.iter()
+            .min_by_key(off)
+            .map(|(_, people)| people.clone())
+    }
+
+    fn keep(&self, stamp: Stamp, people: &[PersonTruth]) {
+        let mut seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if seen.len() >= SEEN_KEPT {
+            seen.pop_front();
+        }
+        seen.push_back((stamp, people.to_vec()));
+    }
+}
+
+/// From an exposure's middle to the computer, ns.
+const PICTURE_WAY_NS: i64 = 8_000_000;
+
+impl SimulatedEye {
+    /// Takes the pictures that have arrived by `now`; where the base was is known until then.
+    fn advance(&mut self, now: Stamp, map_from_base: impl Fn(Stamp) -> Pose) {
+        let due = |camera: &SimulatedCamera| {
+            let exposed = camera.next_stamp()?;
+            (exposed + PICTURE_WAY_NS <= now).then_some(exposed)
+        };
+        while let Some(exposed) = due(&self.camera) {
+            let Some(frame) = self.camera.next_frame_from(&map_from_base(exposed)) else {
+                return;
+            };
+            self.seen.keep(exposed, &frame.people);
+            let received = exposed + PICTURE_WAY_NS;
+            self.port
+                .expose(exposed, received, &frame.depth, &frame.color);
+        }
+    }
 }
 
 impl Work for SimulatorTask {
@@ -249,6 +314,9 @@ impl Work for SimulatorTask {
             |stamp| walker.map_from_base(stamp),
             |stamp, port, bytes| packets.lock().push_back((stamp, port, bytes.to_vec())),
         );
+        if let Some(eye) = &mut self.eye {
+            eye.advance(now, |stamp| walker.map_from_base(stamp));
+        }
         Progress::Done
     }
 }

@@ -21,6 +21,8 @@ pub struct Supervisor {
     pub signs: SharedSigns,
     /// What is told.
     pub health: Health,
+    /// Whether there is to be a camera.
+    pub has_camera: bool,
     /// Whether an emergency stop on a bus is expected.
     pub has_stop_node: bool,
     /// When it began.
@@ -47,6 +49,10 @@ impl Work for Supervisor {
         };
         self.tell(Trouble::LidarLost, lost(&signs.scan));
         self.tell(Trouble::RobotLost, lost(&signs.robot));
+        self.tell(Trouble::CameraLost, self.has_camera && lost(&signs.camera));
+        let no_model = signs.model_missing.load(Ordering::Relaxed)
+            || signs.network_fails.load(Ordering::Relaxed);
+        self.tell(Trouble::ModelMissing, no_model);
         let stop_lost = self.has_stop_node && lost(&signs.stop_node);
         self.tell(Trouble::EmergencyStopLost, stop_lost);
         let poor = !matches!(signs.condition.get(), "OK" | "UNKNOWN");

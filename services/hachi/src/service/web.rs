@@ -35,6 +35,11 @@ pub struct Status {
     pub loops: u64,
     /// Commands that were cut to a limit.
     pub limited: u64,
+    /// People in view.
+    pub people_in_view: u32,
+    /// What is known of the first person whom the robot knows: `SEEN`, `FOUND`, `UNSURE`, `LOST`,
+    /// `SEARCHING`; `None` where it knows nobody.
+    pub person: Option<String>,
     /// Charge of the battery, per cent, where it is known.
     pub battery_percent: Option<u32>,
     /// Every task.
@@ -55,6 +60,8 @@ impl Status {
             nodes: signs.nodes.load(Ordering::Relaxed),
             loops: signs.loops.load(Ordering::Relaxed),
             limited: signs.limited.load(Ordering::Relaxed),
+            people_in_view: signs.people_in_view.load(Ordering::Relaxed),
+            person: Some(signs.person.get().to_owned()).filter(|word| !word.is_empty()),
             battery_percent: (1..=100).contains(&battery).then_some(battery),
             tasks: telemetry.rows(),
             latencies: telemetry.latency_rows(),

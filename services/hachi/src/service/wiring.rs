@@ -7,8 +7,11 @@
 //! stop node ─────↗                         │
 //!    │         ↑ wish                      ↓
 //!    └ legs    └──────────────────── behaviour
+//!
+//! pictures ─ camera receive ─ detection ─ tracking
 //! ```
 
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Patrol, SafetyGate, Sight};
@@ -16,6 +19,9 @@ use hachi_bridge::message::Sensor;
 use hachi_cloud::Filters;
 use hachi_hal::{LidarScans, PacketSource, Pose, Rotation};
 use hachi_odometry::Odometry;
+use hachi_people::identify::AppearanceModel;
+use hachi_people::observe::Observer;
+use hachi_people::watch::Watch;
 use hachi_robosense::{RobosenseConfig, RobosenseScans};
 use hachi_runtime::{Histogram, SoftWatchdog, TaskClock, TaskTable, WhenFull, Work, bounded};
 use hachi_slam::Slam;
@@ -27,18 +33,21 @@ use nalgebra::Translation3;
 use super::base::BaseCommandTask;
 use super::behaviour::Behaviour;
 use super::body::UnitreeBody;
+use super::camera::{CameraReceive, PictureSource};
 use super::crew::Crew;
+use super::detection::Detection;
 use super::emergency_stop::{EmergencyStopTask, OpenBus};
 use super::filter::Filter;
 use super::legs::Legs;
 use super::lidar::LidarReceive;
-use super::messages::{Belt, Correction, Kept, Placed, Scan, belt};
+use super::messages::{Belt, Correction, Kept, Looked, Picture, Placed, Scan, belt};
 use super::odometry::OdometryTask;
 use super::record::{Datagram, RecorderTask, Tap};
 use super::settings::{Platform, row};
 use super::signs::SharedSigns;
 use super::slam::SlamTask;
 use super::supervisor::Supervisor;
+use super::tracking::{Audience, Tracking};
 use super::{odometry, record, rows};
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
@@ -61,6 +70,28 @@ pub struct Devices<P, L> {
     pub sensor: Sensor,
     /// The bus of the emergency stop's node, where the settings name one.
     pub stop_bus: Option<OpenBus>,
+    /// The camera, where there is to be one.
+    pub eyes: Option<Eyes>,
+}
+
+/// A camera, and what is made of its pictures.
+pub struct Eyes {
+    /// The camera.
+    pub camera: Box<dyn PictureSource>,
+    /// The networks; nobody is looked for without.
+    pub people: Option<Watcher>,
+    /// Whether networks were asked for and are not there.
+    pub model_missing: bool,
+}
+
+/// Looks for people and knows some.
+pub struct Watcher {
+    /// The networks.
+    pub observer: Observer,
+    /// Who is known: each is looked for from the beginning.
+    pub known: Vec<AppearanceModel>,
+    /// Who else sees it.
+    pub audience: Option<Box<dyn Audience>>,
 }
 
 /// How the tasks are run.
@@ -221,6 +252,7 @@ where
     table.add(row(settings, rows::LEGS), to_legs, gauges, Box::new(legs));
 
     let supervisor = Supervisor {
+        has_camera: devices.eyes.is_some(),
         signs: Arc::clone(&signs),
         health: table.health().clone(),
         has_stop_node,
@@ -311,6 +343,10 @@ where
     };
     table.add(spec, to_slam, gauges, Box::new(task));
 
+    if let Some(eyes) = devices.eyes {
+        open(eyes, settings, &mut table, &signs);
+    }
+
     if records {
         let gauges = vec![packets_to_record.full.gauge(), bodies_to_record.gauge()];
         let task = RecorderTask {
@@ -331,6 +367,57 @@ where
         watchdog,
         scan_times,
     })
+}
+
+/// The tasks behind a camera.
+fn open(eyes: Eyes, settings: &Settings, table: &mut TaskTable, signs: &SharedSigns) {
+    signs
+        .model_missing
+        .store(eyes.model_missing, Ordering::Relaxed);
+    let [to_detection, to_tracking] = [0; 2].map(|_| table.bell());
+    // Of pictures only the newest counts.
+    let (pictures, pictures_end) = belt::<Picture>(table, "pictures", 1, &to_detection);
+    let (looked, looked_end) = belt::<Looked>(table, "looked at", 2, &to_tracking);
+    let receive = CameraReceive {
+        camera: eyes.camera,
+        out: pictures,
+        signs: Arc::clone(signs),
+        retry_at: None,
+    };
+    let bell = table.bell();
+    let spec = row(settings, rows::CAMERA_RECEIVE);
+    table.add(spec, bell, vec![], Box::new(receive));
+    let Some(people) = eyes.people else { return };
+
+    let mut watch = Watch::new(people.observer.even_score(), settings.people.identify);
+    for model in people.known {
+        watch.identifier().enrol(model, None);
+    }
+    let gauges = vec![pictures_end.full.gauge()];
+    let detection = Detection {
+        observer: people.observer,
+        pictures: pictures_end,
+        out: looked,
+        signs: Arc::clone(signs),
+        count: 0,
+        level: 0,
+    };
+    let spec = row(settings, rows::DETECTION);
+    table.add(spec, to_detection, gauges, Box::new(detection));
+
+    let gauges = vec![looked_end.full.gauge()];
+    let tracking = Tracking {
+        watch,
+        looked: looked_end,
+        last: None,
+        audience: people.audience,
+        latency: table.latency("shutter to target"),
+        clock: table.clock().clone(),
+        signs: Arc::clone(signs),
+        said: None,
+    };
+    let spec = row(settings, rows::TRACKING);
+    table.add(spec, to_tracking, gauges, Box::new(tracking));
 }
 
 /// The driver of a sensor, as a task.

@@ -6,12 +6,13 @@
 mod furniture;
 mod glass;
 mod office;
+mod passers;
 mod ring;
 mod rooms;
 mod storey;
 
 pub(crate) use glass::glass_corridor;
-pub(crate) use office::office;
+pub(crate) use office::{office, office_people};
 pub(crate) use storey::storey;
 
 use crate::material::Material;

@@ -5,14 +5,16 @@ use std::f64::consts::FRAC_PI_4;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::WALL_M;
 use super::ring::Ring;
 use super::rooms::{CORNER_M, Row, Visit};
+use super::{WALL_M, passers};
+use crate::cast::Cast;
 use crate::floor::RaisedFloor;
 use crate::material::Material;
+use crate::person::Person;
 use crate::preset::World;
 use crate::scene_builder::SceneBuilder;
-use crate::trajectory::{Gait, TrajectoryBuilder};
+use crate::trajectory::{Gait, Trajectory, TrajectoryBuilder};
 
 /// How deep the outer rooms are, metres.
 const ROOM_DEPTH_M: f64 = 5.0;
@@ -28,10 +30,10 @@ const RAMP: RaisedFloor = RaisedFloor {
 /// Where the ramp begins on that side, metres from the corner of the centre line.
 const RAMP_AT_M: f64 = 8.0;
 
-/// The office of a seed, with a robot that walks around it and looks into two rooms.
-pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
+/// The corridor, by the first numbers that are drawn.
+fn ring(random: &mut ChaCha8Rng) -> Ring {
     // The robot starts at the origin, 4 m along the first side.
-    let ring = Ring {
+    Ring {
         low: [-4.0, 0.0],
         high: [
             random.random_range(20.0..24.0),
@@ -39,7 +41,21 @@ pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
         ],
         half_width: 1.1,
         ceiling: random.random_range(2.6..2.9),
-    };
+    }
+}
+
+/// Who walks in the corridor of the office of `random`, while the robot patrols it.
+pub(crate) fn office_people(
+    random: &mut ChaCha8Rng,
+    robot: &Trajectory,
+    cast: &mut Cast,
+) -> Vec<Person> {
+    passers::people(&ring(random), robot, cast)
+}
+
+/// The office of a seed, with a robot that walks around it and looks into two rooms.
+pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
+    let ring = ring(random);
     let mut builder = SceneBuilder::new();
     ring.floor_and_ceiling(&mut builder, Material::FLOOR, ROOM_DEPTH_M + 8.0);
     let ramp = {

@@ -28,6 +28,68 @@ impl Ring {
         [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][i % 4]
     }
 
+    /// All the way round, metres.
+    pub fn round_m(&self) -> f64 {
+        2.0 * (self.length(0) + self.length(1))
+    }
+
+    /// How far along the centre line the place nearest to this one is, metres from the first corner.
+    pub fn nearest(&self, [x, y]: [f64; 2]) -> f64 {
+        let corners = self.corners();
+        let mut begins_m = 0.0;
+        let mut best = (f64::INFINITY, 0.0);
+        for (i, corner) in corners.iter().enumerate() {
+            let (along, length) = (Self::along(i), self.length(i));
+            let to = [x - corner[0], y - corner[1]];
+            let way = (to[0] * along[0] + to[1] * along[1]).clamp(0.0, length);
+            let off = (to[0] - way * along[0]).hypot(to[1] - way * along[1]);
+            if off < best.0 {
+                best = (off, begins_m + way);
+            }
+            begins_m += length;
+        }
+        best.1
+    }
+
+    /// The way from one place to a further one, metres along the centre line, over the corners
+    /// between them and so far to its left, metres.
+    pub fn between(&self, from_m: f64, to_m: f64, left_m: f64) -> Vec<[f64; 2]> {
+        let mut path = vec![self.place(from_m, left_m)];
+        let round_m = self.round_m();
+        let mut corner_m = (from_m / round_m).floor() * round_m;
+        for i in 0.. {
+            if corner_m >= to_m {
+                break;
+            }
+            if corner_m > from_m {
+                path.push(self.place(corner_m, left_m));
+            }
+            corner_m += self.length(i);
+        }
+        path.push(self.place(to_m, left_m));
+        path
+    }
+
+    /// A place along the centre line and to its left.
+    fn place(&self, way_m: f64, left_m: f64) -> [f64; 2] {
+        let ([x0, y0], [x1, y1]) = (self.low, self.high);
+        let within = Self {
+            low: [x0 + left_m, y0 + left_m],
+            high: [x1 - left_m, y1 - left_m],
+            ..*self
+        };
+        let mut left = way_m.rem_euclid(self.round_m());
+        let mut side = 0;
+        while side < 3 && left > self.length(side) {
+            left -= self.length(side);
+            side += 1;
+        }
+        let share = left / self.length(side);
+        let corners = within.corners();
+        let (from, to) = (corners[side], corners[(side + 1) % 4]);
+        [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]))
+    }
+
     /// From corner to corner, metres.
     pub fn length(&self, i: usize) -> f64 {
         let axis = i % 2;

@@ -186,28 +186,37 @@ impl SimulatedCamera {
 
     /// The next frame; `None` after the end of the simulation.
     pub fn next_frame(&mut self) -> Option<&CameraFrame> {
-        self.next_of(true)
+        self.next_of(true, None)
+    }
+
+    /// The next frame of a robot whose way is not known beforehand, from where its base is at
+    /// [`next_stamp`](Self::next_stamp).
+    pub fn next_frame_from(&mut self, map_from_base: &Pose) -> Option<&CameraFrame> {
+        self.next_of(true, Some(map_from_base))
     }
 
     /// The next frame without its depth, which takes most of the time: that picture stays as it was.
     pub fn next_color_frame(&mut self) -> Option<&CameraFrame> {
-        self.next_of(false)
+        self.next_of(false, None)
     }
 
-    fn next_of(&mut self, with_depth: bool) -> Option<&CameraFrame> {
+    fn next_of(&mut self, with_depth: bool, map_from_base: Option<&Pose>) -> Option<&CameraFrame> {
         let stamp = self.next_stamp()?;
-        self.expose(stamp, with_depth);
+        let map_from_depth = match map_from_base {
+            Some(map_from_base) => map_from_base * self.config.base_from_depth,
+            None => self.map_from_depth(stamp),
+        };
+        self.expose(stamp, with_depth, &map_from_depth);
         self.frame.sequence = self.next;
         self.next = self.next.saturating_add(1);
         Some(&self.frame)
     }
 
-    fn expose(&mut self, stamp: Stamp, with_depth: bool) {
+    fn expose(&mut self, stamp: Stamp, with_depth: bool, map_from_depth: &Pose) {
         let time_s = stamp.secs_since(self.start);
         let floor = self.scene.floor();
         self.bodies.clear();
         self.frame.people.clear();
-        let map_from_depth = self.map_from_depth(stamp);
         let map_from_color = map_from_depth * self.config.geometry.color_from_depth.inverse();
         let there = self.people.iter().filter_map(|person| {
             let presence = person.presence(time_s, floor)?;
@@ -231,7 +240,7 @@ impl SimulatedCamera {
             view.depth(
                 &self.config,
                 &self.depth_lens,
-                &map_from_depth,
+                map_from_depth,
                 &mut frame.depth,
             );
         }

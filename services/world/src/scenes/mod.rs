@@ -8,11 +8,12 @@
 //! People come from out of the camera's sight and go there; nobody appears in the middle of it.
 
 mod actor;
-mod cast;
+
 mod hall;
 mod scripts;
 
 use crate::camera::CameraConfig;
+use crate::cast::Cast;
 use crate::noise::{Purpose, generator};
 use crate::simulation::SimulationConfig;
 
@@ -102,7 +103,7 @@ impl Script {
     /// The scene of a seed.
     pub fn scene(self, seed: u64) -> ScriptedScene {
         let random = generator(seed, Purpose::People, self as u64);
-        let mut cast = cast::Cast::new(random);
+        let mut cast = Cast::new(random);
         let play = scripts::write(self, &mut cast);
         let simulation = SimulationConfig {
             people: play.people.into(),

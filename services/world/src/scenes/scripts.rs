@@ -5,9 +5,9 @@
 
 use super::Script;
 use super::actor::Actor;
-use super::cast::Cast;
 use super::hall::Robot;
 use crate::camera::Light;
+use crate::cast::Cast;
 use crate::person::{Outfit, Person};
 
 /// The identity of the person that the user picks: the first who is cast.

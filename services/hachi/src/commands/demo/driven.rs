@@ -9,13 +9,17 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use hachi_realsense::device::simulated::SimulatedPort;
 use hachi_runtime::executor::virtual_time::VirtualTime;
 use hachi_runtime::{Health, VirtualClock};
 use hachi_trajectory::Trajectory;
 use hachi_world::SimulationConfig;
+use tracing::warn;
 
 use super::Walked;
+use super::people::{self, Album, Spectator};
 use crate::cli::mapping::DemoArguments;
+use crate::cli::people::NetworkArguments;
 use crate::commands::replay::slam;
 use crate::commands::run::recording_failed;
 use crate::commands::simulate::platform_of;
@@ -27,11 +31,11 @@ use crate::mapping::Ended;
 use crate::recorder::Recorder;
 use crate::results::Results;
 use crate::service::signs::SharedSigns;
-use crate::service::simulated::{connect, sensor_of};
-use crate::service::simulator::{Truth, route};
+use crate::service::simulated::{Besides, Spectacle, connect_with, sensor_of};
+use crate::service::simulator::{SeenPeople, Truth, route};
 use crate::service::web::Status;
-use crate::service::wiring::{Running, Service};
-use crate::{output, progress, task_table};
+use crate::service::wiring::{Running, Service, Watcher};
+use crate::{networks, output, progress, task_table};
 
 /// Virtual time that passes between two looks at Ctrl-C and the screen, ns.
 const SLICE_NS: i64 = 100_000_000;
@@ -60,6 +64,9 @@ pub fn walk(
     let mut world = SimulationConfig::preset(arguments.world, arguments.seed, f64::MAX);
     world.sensor = arguments.sensor;
     world.base_from_lidar = settings.base_from_lidar.pose();
+    if !arguments.nobody {
+        world.people = arguments.world.people(arguments.seed).into();
+    }
     settings.patrol.places = route(&world.trajectory);
     settings.patrol.reach_m = REACH_M;
     let speed = world.trajectory.gait().speed;
@@ -73,13 +80,18 @@ pub fn walk(
         None => None,
     };
     let running = Running::VirtualTime;
-    let (service, truth) = connect(
+    let (spectacle, album) = spectacle(arguments, &world).unzip();
+    let (service, truth) = connect_with(
         &settings,
         &platform,
         &world,
         &clock,
         running,
         (slam, recorder),
+        Besides {
+            people: spectacle,
+            ..Besides::default()
+        },
     )?;
     let Service {
         table,
@@ -127,6 +139,14 @@ pub fn walk(
             report.stages.insert(stage.to_owned(), times);
         }
     }
+    let album = album.map(|album| {
+        let album = std::mem::take(&mut *people::lock(&album));
+        let mut told = album.report();
+        let latencies = run.telemetry().latency_rows();
+        let shutter = latencies.iter().find(|row| row.name == "shutter to target");
+        told.shutter_to_target_p99_ms = shutter.map(|row| row.times.p99_ms);
+        (told, album.sheet)
+    });
     // The recorder's last lines are written when its task goes.
     drop(run);
     if screen.signs.recording_fails.load(Ordering::Relaxed) {
@@ -142,8 +162,41 @@ pub fn walk(
         report,
         ended,
         robot: Some(platform.robot.name()),
+        people: album,
     };
     Ok(walked)
+}
+
+/// The camera, the networks behind it and who sees it, where somebody walks about to be seen; and what
+/// will have been seen. Without networks nobody is looked for, which the log says.
+fn spectacle(
+    arguments: &DemoArguments,
+    world: &SimulationConfig,
+) -> Option<(Spectacle, Arc<Mutex<Album>>)> {
+    if world.people.is_empty() {
+        return None;
+    }
+    let observer = match networks::observer(&NetworkArguments::own()) {
+        Ok(observer) => observer,
+        Err(failure) => {
+            warn!("nobody is looked for: {failure}");
+            return None;
+        }
+    };
+    let seen = SeenPeople::default();
+    let (spectator, album) = Spectator::new(seen.clone(), world.start, arguments.seconds);
+    let camera = people::camera();
+    let spectacle = Spectacle {
+        port: SimulatedPort::new(camera.geometry),
+        camera,
+        watcher: Watcher {
+            observer,
+            known: Vec::new(),
+            audience: Some(Box::new(spectator)),
+        },
+        seen,
+    };
+    Some((spectacle, album))
 }
 
 /// Where the robot truly was at the trajectory's times, in its frame: the base at the first scan.

@@ -74,6 +74,7 @@ pub fn walk(
         report,
         ended,
         robot: None,
+        people: None,
     })
 }
 

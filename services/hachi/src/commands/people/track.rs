@@ -1,7 +1,7 @@
 //! `hachi people track`: everyone, from frame to frame.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use hachi_bridge::AtomicFile;
@@ -12,7 +12,9 @@ use serde::Serialize;
 
 use crate::cli::people::PeopleTrackArguments;
 use crate::exit::Failure;
+use crate::images::Rgb;
 use crate::interrupt::Cancelled;
+use crate::people_pictures::{ContactSheet, Labels, annotate, write_png};
 use crate::{images, mot_files, networks, output, progress};
 
 /// Where nothing says how fast frames follow one another: slower than most, so that people may
@@ -97,6 +99,10 @@ fn through_images(
         ..TrackerConfig::default()
     });
     let mut history = TrackHistory::default();
+    let mut pictures = match &arguments.pictures {
+        Some(folder) => Some(Pictures::into_folder(folder, frames.len())?),
+        None => None,
+    };
     let (mut detections, mut unreadable) = (0, 0);
     let begun = Instant::now();
     let bar = progress::bar(Some(frames.len() as u64), "frames");
@@ -106,6 +112,7 @@ fn through_images(
             return Err(Failure::Interrupted("no tracks were written".to_owned()));
         }
         bar.inc(1);
+        let mut unwritten = None;
         let image = images::read(&frame.path);
         let observation = image.and_then(|image| {
             let view = image.view().map_err(|e| e.to_string())?;
@@ -119,14 +126,29 @@ fn through_images(
                 features: observed.features,
             });
             history.note(frame.number, tracker.tracks());
+            if let Some(pictures) = &mut pictures {
+                let labels = Labels {
+                    tracks: tracker.tracks(),
+                    statuses: &[],
+                    found: observer.found(),
+                    caption: &frame.number.to_string(),
+                };
+                unwritten = pictures.draw(frame.number, &annotate(&view, &labels)).err();
+            }
             Ok(())
         });
         if let Err(reason) = observation {
             tracing::warn!(file = %frame.path.display(), %reason, "frame left out");
             unreadable += 1;
         }
+        if let Some(failure) = unwritten {
+            return Err(failure);
+        }
     }
     bar.finish_and_clear();
+    if let Some(pictures) = &pictures {
+        pictures.finish()?;
+    }
     if unreadable == frames.len() {
         return Err(Failure::new(
             format_args!("no frame of {} can be looked at", arguments.input.display()),
@@ -150,6 +172,48 @@ fn through_images(
         time_ms: begun.elapsed().as_secs_f64() * 1e3,
     };
     Ok((tracks, summary))
+}
+
+/// Frames with everybody marked, as files, and some of them on one sheet.
+struct Pictures {
+    folder: PathBuf,
+    sheet: ContactSheet,
+    /// Every so many frames one goes on the sheet.
+    every: usize,
+    count: usize,
+}
+
+/// Pictures on the sheet, and in a row.
+const ON_SHEET: usize = 12;
+const COLUMNS: usize = 3;
+
+impl Pictures {
+    fn into_folder(folder: &Path, frames: usize) -> Result<Self, Failure> {
+        std::fs::create_dir_all(folder).map_err(|error| {
+            Failure::new(
+                format_args!("{} can't be made: {error}", folder.display()),
+                "choose another folder with --pictures",
+            )
+        })?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            sheet: ContactSheet::new(COLUMNS),
+            every: frames.div_ceil(ON_SHEET).max(1),
+            count: 0,
+        })
+    }
+
+    fn draw(&mut self, number: u64, picture: &Rgb) -> Result<(), Failure> {
+        if self.count % self.every == self.every / 2 {
+            self.sheet.push(picture);
+        }
+        self.count += 1;
+        write_png(&self.folder.join(format!("{number:06}.png")), picture)
+    }
+
+    fn finish(&self) -> Result<(), Failure> {
+        self.sheet.write(&self.folder.join("sheet.png"))
+    }
 }
 
 /// MOTChallenge counts pixels from 1, networks from 0.

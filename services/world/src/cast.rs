@@ -50,7 +50,7 @@ const SHADE: i32 = 10;
 const SIMILAR: i32 = 34;
 
 /// Hands out people.
-pub(super) struct Cast {
+pub(crate) struct Cast {
     random: ChaCha8Rng,
     tops: Vec<Rgb>,
     people: u32,

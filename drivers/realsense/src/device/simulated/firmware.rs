@@ -1,9 +1,9 @@
 //! A RealSense's firmware: what it answers when the driver asks for itself, its tables and its unit.
 
+use crate::controls::{Query, Selector};
+use crate::encode;
+use crate::monitor::{DeviceInfo, MONITOR_LEN, Opcode};
 use hachi_hal::RgbdGeometry;
-use hachi_realsense::controls::{Query, Selector};
-use hachi_realsense::encode;
-use hachi_realsense::monitor::{DeviceInfo, MONITOR_LEN, Opcode};
 
 /// Distance between the imagers of a D455, metres: the maker's figure. No image depends on it.
 const BASELINE_M: f64 = 0.095;
@@ -30,7 +30,10 @@ impl Firmware {
     /// What a control is set to, a command to the firmware among them.
     pub fn set(&mut self, selector: Selector, bytes: &[u8]) {
         if selector == Selector::Monitor {
-            let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+            let number = |at: usize| {
+                let four = bytes.get(at..at + 4).and_then(|four| four.try_into().ok());
+                four.map_or(0, u32::from_le_bytes)
+            };
             self.asked = [number(4), number(8)];
         }
     }
@@ -61,7 +64,8 @@ impl Firmware {
                 let unit_um = (geometry.depth_unit_m * 1e6).round() as u32;
                 encode::answer(Opcode::ReadAdvanced, &unit_um.to_le_bytes())
             }
-            other => panic!("the driver asked {other:x?}"),
+            // What a driver should never ask: the answer is none, and is refused.
+            _ => [0; MONITOR_LEN],
         }
     }
 }
