@@ -358,7 +358,7 @@ fn a_scene_is_watched_and_its_person_known_to_all_three_ways() {
         let figure = &scene[way];
         // Picked after three seconds; the person walks about in plain sight.
         let visible_s = figure["visible_s"].as_f64().unwrap();
-        assert!((8.0..9.2).contains(&visible_s), "{way}: {figure}");
+        assert!((3.5..4.2).contains(&visible_s), "{way}: {figure}");
         assert!(
             figure["tracked_share"].as_f64().unwrap() > 0.9,
             "{way}: {figure}"

@@ -286,7 +286,8 @@ impl SimulatedEye {
             (exposed + PICTURE_WAY_NS <= now).then_some(exposed)
         };
         while let Some(exposed) = due(&self.camera) {
-            let Some(frame) = self.camera.next_frame_from(&map_from_base(exposed)) else {
+            // Nobody looks at the depth yet: every pixel says that nothing was measured.
+            let Some(frame) = self.camera.next_color_frame_from(&map_from_base(exposed)) else {
                 return;
             };
             self.seen.keep(exposed, &frame.people);

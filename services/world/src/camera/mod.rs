@@ -189,10 +189,10 @@ impl SimulatedCamera {
         self.next_of(true, None)
     }
 
-    /// The next frame of a robot whose way is not known beforehand, from where its base is at
-    /// [`next_stamp`](Self::next_stamp).
-    pub fn next_frame_from(&mut self, map_from_base: &Pose) -> Option<&CameraFrame> {
-        self.next_of(true, Some(map_from_base))
+    /// As [`next_color_frame`](Self::next_color_frame), of a robot whose way is not known beforehand:
+    /// from where its base is at [`next_stamp`](Self::next_stamp).
+    pub fn next_color_frame_from(&mut self, map_from_base: &Pose) -> Option<&CameraFrame> {
+        self.next_of(false, Some(map_from_base))
     }
 
     /// The next frame without its depth, which takes most of the time: that picture stays as it was.
