@@ -17,7 +17,7 @@ from pictures import Pictures
 from store import store
 
 BATCH = 16
-RATE = 3e-3
+RATE = 2e-3
 MOST_PEOPLE = 8
 # Seen on less than this, people are neither asked for nor missed: pixels of the input.
 LEAST_AREA, LEAST_HEIGHT = 24, 8
@@ -97,6 +97,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("train"), parser.add_argument("validation"), parser.add_argument("out")
     parser.add_argument("--steps", type=int, default=1500)
+    parser.add_argument("--start", help="weights to go on from")
     arguments = parser.parse_args()
     torch.set_num_threads(2)
     torch.manual_seed(1)
@@ -104,6 +105,8 @@ def main():
     images, labels = load(arguments.train)
     validation = load(arguments.validation)
     network = Detector().to(memory_format=torch.channels_last)
+    if arguments.start:
+        network.load_state_dict(torch.load(arguments.start))
     mean = copy.deepcopy(network)
     print(f"{len(images)} pictures, {sum(p.numel() for p in network.parameters())} parameters", flush=True)
     optimiser = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=0.02)
@@ -124,7 +127,8 @@ def main():
         torch.nn.utils.clip_grad_norm_(network.parameters(), 10.0)
         optimiser.step()
         follow(mean, network, min(0.995, step / (step + 20)))
-        if step % 150 == 0:
+        if step % 100 == 0:
+            torch.save(mean.state_dict(), arguments.out + ".pt")
             said = " ".join(f"{p.item():.3f}" for p in parts)
             print(f"{step} {(time.monotonic() - begun) / 60:.1f} min: {said}; {validate(mean, *validation)}", flush=True)
     torch.save(mean.state_dict(), arguments.out + ".pt")

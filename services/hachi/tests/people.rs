@@ -348,7 +348,7 @@ fn a_scene_is_watched_and_its_person_known_to_all_three_ways() {
         "--scenes",
         "return",
         "--seconds",
-        "12",
+        "7",
         "--json",
     ])
     .json();

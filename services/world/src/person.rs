@@ -406,4 +406,39 @@ mod tests {
                 .is_none()
         );
     }
+
+    /// Parts are passed over by the balls around them; none that is met may be.
+    #[test]
+    fn a_body_is_hit_where_the_nearest_of_its_parts_is() {
+        let outfit = Outfit {
+            top: [1; 3],
+            trousers: [2; 3],
+            shoes: [3; 3],
+        };
+        let person = Person {
+            id: 1,
+            height_m: 1.9,
+            skin: [4; 3],
+            hair: [5; 3],
+            visits: Vec::new(),
+        };
+        let presence = Presence {
+            map_from_person: Pose::translation(40.0, -30.0, 2.0),
+            visit: 0,
+            walked_m: 0.3,
+            walks: true,
+        };
+        let body = Body::new(&person, &outfit, &presence);
+        let mut hits = 0;
+        for i in 0..4000_u16 {
+            let aim = [f32::from(i % 50) / 25.0 - 1.0, f32::from(i / 50) / 40.0];
+            let ray = ray([36.0, -31.0, 2.6], [40.0, -30.0 + aim[0], 2.0 + aim[1]]);
+            let all = body.parts.iter().filter_map(|part| part.hit(&ray));
+            let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
+            let hit = body.cast(&ray, 100.0).map(|hit| (hit.distance, hit.normal));
+            assert_eq!(hit, nearest, "{i}");
+            hits += usize::from(hit.is_some());
+        }
+        assert!((500..3000).contains(&hits), "{hits}");
+    }
 }

@@ -355,7 +355,10 @@ impl FollowMe {
         match self {
             Self::Calibrates(calibration) => {
                 let track = seen(tracks, picked)?;
-                calibration.push(features.get(track.detection?)?);
+                // An unsure detection has no feature: it is followed all the same.
+                if let Some(feature) = features.get(track.detection?) {
+                    calibration.push(feature);
+                }
                 if calibration.is_complete()
                     && let Ok(model) = calibration.finish()
                 {

@@ -26,7 +26,7 @@ const STANDS_M: f64 = 0.12;
 /// The robot's person first, then the others.
 pub(super) fn people(ring: &Ring, robot: &Trajectory, cast: &mut Cast) -> Vec<Person> {
     let mut people = vec![ahead(ring, robot, cast)];
-    for (from_m, speed_m_s) in [(13.0, 1.0), (24.0, 0.7), (46.0, 0.9)] {
+    for (from_m, speed_m_s) in [(22.0, 1.0), (34.0, 0.7), (52.0, 0.9)] {
         let from_m = from_m + cast.between(-1.0, 1.0);
         people.push(towards(ring, from_m, speed_m_s, cast));
     }
