@@ -10,6 +10,7 @@ const TESTS: &[&str] = &[
     include_str!("../../hachi/tests/service.rs"),
     include_str!("../../hachi/tests/process.rs"),
     include_str!("../../hachi/tests/emergency_stop.rs"),
+    include_str!("../../hachi/tests/eyes.rs"),
 ];
 
 fn rows() -> Vec<Vec<&'static str>> {

@@ -69,7 +69,10 @@ fn every_key_that_stands_there_is_understood() {
                 format!("{key} = 1")
             }
             ("emergency_stop.can", _) => "emergency_stop.can = \"can0\"".to_owned(),
-            ("camera.serial" | "people.detector" | "people.reid" | "people.store", _) => {
+            (
+                "camera.serial" | "people.detector" | "people.reid" | "people.store" | "people.key",
+                _,
+            ) => {
                 format!("{key} = \"a\"")
             }
             ("service.map", _) => "service.map = \"a.map\"".to_owned(),

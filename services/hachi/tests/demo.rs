@@ -33,7 +33,7 @@ fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
     // Its person is in view and followed all the while, and nobody else is.
     let people = &report["people"];
     assert!(
-        (29..=32).contains(&people["pictures"].as_u64().unwrap()),
+        (19..=20).contains(&people["pictures"].as_u64().unwrap()),
         "{people}"
     );
     assert!(

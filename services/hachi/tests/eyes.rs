@@ -88,7 +88,7 @@ impl Rig {
             port: port.clone(),
             watcher: Watcher {
                 observer: blind(),
-                known: Vec::new(),
+                kept: None,
                 audience: None,
             },
             seen: SeenPeople::default(),

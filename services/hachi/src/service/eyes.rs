@@ -4,19 +4,20 @@
 //! rest of the service goes on.
 
 use hachi_datagram::SystemClock;
-use hachi_people::identify::AppearanceModel;
 use hachi_realsense::device::StreamFormat;
 use hachi_realsense::device::v4l2::V4l2Port;
 use hachi_realsense::{RealSense, RealSenseConfig};
-use hachi_store::people::{NetworkIdentity, PeopleFile, PeoplePaths};
+use hachi_store::people::{PeopleFile, PeoplePaths};
 use tracing::{error, info, warn};
 
 use super::camera::ColorOf;
+use super::keeper::Kept;
 use super::settings::{CameraConfig, PeopleConfig};
 use super::wiring::{Eyes, Watcher};
 use crate::cli::people::NetworkArguments;
 use crate::config::Settings;
-use crate::networks;
+use crate::exit::Failure;
+use crate::networks::{self, Chosen};
 
 /// The RealSense of this computer, and the networks, where the settings ask for them.
 pub fn of_this_computer(settings: &Settings, clock: SystemClock) -> Option<Eyes> {
@@ -62,38 +63,26 @@ fn watcher(config: &PeopleConfig) -> Option<Watcher> {
             return None;
         }
     };
-    let known = match (&config.store, &chosen.appearance) {
-        (Some(store), Some(network)) => {
-            let paths = PeoplePaths::beside(store);
-            known(&paths, network).unwrap_or_else(|error| {
-                warn!(error, "nobody is known");
-                Vec::new()
-            })
+    let kept = config.store.as_deref().and_then(|store| {
+        let mut paths = PeoplePaths::beside(store);
+        if let Some(key) = &config.key {
+            paths.key.clone_from(key);
         }
-        _ => Vec::new(),
-    };
-    info!(known = known.len(), "people are looked for");
+        let kept = kept(&paths, &chosen);
+        kept.map_err(|failure| warn!("nobody is known: {failure}"))
+            .ok()
+    });
+    info!("people are looked for");
     Some(Watcher {
         observer,
-        known,
+        kept,
         audience: None,
     })
 }
 
-/// Everybody in the store whom this network can know.
-fn known(paths: &PeoplePaths, network: &std::path::Path) -> Result<Vec<AppearanceModel>, String> {
-    let network = NetworkIdentity::of_file(network).map_err(|error| error.to_string())?;
-    let Some(store) = PeopleFile::open_if_there(paths).map_err(|error| error.to_string())? else {
-        return Ok(Vec::new());
-    };
-    let listing = store.list().map_err(|error| error.to_string())?;
-    let mut known = Vec::new();
-    for person in &listing.people {
-        match store.model_of(person, &network) {
-            Ok(model) => known.push(model),
-            // The error names the person; the log does not.
-            Err(_) => warn!("somebody in the store is not known: enrolled with another network?"),
-        }
-    }
-    Ok(known)
+/// The store of people, and the network whose models in it are of use.
+fn kept(paths: &PeoplePaths, chosen: &Chosen) -> Result<Kept, Failure> {
+    let network = chosen.identity()?;
+    let store = PeopleFile::open_or_create(paths).map_err(Failure::said)?;
+    Ok(Kept { store, network })
 }

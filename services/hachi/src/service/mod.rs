@@ -19,6 +19,7 @@
 //! | [`tracking`] | `tracking`: who is where, whom the robot knows | a picture that was looked at |
 //! | [`behaviour`] | `behaviour`: the patrol | 50 ms |
 //! | [`record`] | `recorder`: what sensors sent, to a file; where one is wanted | 50 ms |
+//! | [`keeper`] | `keeper`: what is learnt of people, to their store; where there is one | 1 s |
 //! | [`supervisor`] | `supervisor`: what is stale, what is wrong | 50 ms |
 //!
 //! [`messages`] is what passes between them, [`signs`] what each leaves for whoever asks, [`rows`]
@@ -34,6 +35,7 @@ pub mod detection;
 pub mod emergency_stop;
 pub mod eyes;
 pub mod filter;
+pub mod keeper;
 pub mod legs;
 pub mod lidar;
 pub mod messages;

@@ -125,8 +125,11 @@ pub const DETECTION: TaskSpec = with_ladder(
 /// What sensors sent, to a file.
 pub const RECORDER: TaskSpec = row("recorder", every(50), 20_000, 10);
 
+/// What is learnt of people, to the store: it waits for the disk.
+pub const KEEPER: TaskSpec = row("keeper", every(1_000), 300_000, 5);
+
 /// The tasks of a service, in the order of the table.
-pub const ALL: [TaskSpec; 13] = [
+pub const ALL: [TaskSpec; 14] = [
     BASE_COMMAND,
     EMERGENCY_STOP,
     LIDAR_RECEIVE,
@@ -140,6 +143,7 @@ pub const ALL: [TaskSpec; 13] = [
     SLAM,
     DETECTION,
     RECORDER,
+    KEEPER,
 ];
 
 #[cfg(test)]

@@ -115,6 +115,8 @@ pub struct PeopleConfig {
     pub reid: Option<PathBuf>,
     /// Who is known (`hachi people enrol`).
     pub store: Option<PathBuf>,
+    /// Its key file; beside it if unset.
+    pub key: Option<PathBuf>,
     /// How they are known again.
     pub identify: IdentifierConfig,
 }

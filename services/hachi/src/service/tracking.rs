@@ -9,6 +9,7 @@ use hachi_people::watch::Watch;
 use hachi_runtime::{Histogram, Progress, TaskClock, Work};
 use tracing::info;
 
+use super::keeper::Acquaintances;
 use super::messages::{BeltEnd, Looked};
 use super::signs::SharedSigns;
 
@@ -26,6 +27,8 @@ pub struct Tracking {
     pub looked: BeltEnd<Looked>,
     /// Time of the last picture.
     pub last: Option<Stamp>,
+    /// Who in the store is whom in view; `None` without a store.
+    pub acquaintances: Option<Acquaintances>,
     /// Who sees it.
     pub audience: Option<Box<dyn Audience>>,
     /// From the middle of the exposure to where the robot's people are.
@@ -46,7 +49,13 @@ impl Work for Tracking {
         let stamp = looked.picture.stamp;
         let dt_s = self.last.map_or(0.0, |last| stamp.secs_since(last));
         self.last = Some(stamp);
+        if let Some(acquaintances) = &mut self.acquaintances {
+            acquaintances.hear(&mut self.watch);
+        }
         self.watch.step(&looked.observation(), dt_s);
+        if let Some(acquaintances) = &mut self.acquaintances {
+            acquaintances.tell(&self.watch, stamp);
+        }
         let now = self.clock.now();
         self.latency.record_signed_ns(now.nanos_since(stamp));
         self.tell();

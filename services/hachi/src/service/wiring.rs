@@ -19,7 +19,6 @@ use hachi_bridge::message::Sensor;
 use hachi_cloud::Filters;
 use hachi_hal::{LidarScans, PacketSource, Pose, Rotation};
 use hachi_odometry::Odometry;
-use hachi_people::identify::AppearanceModel;
 use hachi_people::observe::Observer;
 use hachi_people::watch::Watch;
 use hachi_robosense::{RobosenseConfig, RobosenseScans};
@@ -38,6 +37,7 @@ use super::crew::Crew;
 use super::detection::Detection;
 use super::emergency_stop::{EmergencyStopTask, OpenBus};
 use super::filter::Filter;
+use super::keeper::{Kept as KeptPeople, keeper};
 use super::legs::Legs;
 use super::lidar::LidarReceive;
 use super::messages::{Belt, Correction, Kept, Looked, Picture, Placed, Scan, belt};
@@ -88,8 +88,8 @@ pub struct Eyes {
 pub struct Watcher {
     /// The networks.
     pub observer: Observer,
-    /// Who is known: each is looked for from the beginning.
-    pub known: Vec<AppearanceModel>,
+    /// Who is known, and where what is learnt of them is kept; nobody is without.
+    pub kept: Option<KeptPeople>,
     /// Who else sees it.
     pub audience: Option<Box<dyn Audience>>,
 }
@@ -389,10 +389,13 @@ fn open(eyes: Eyes, settings: &Settings, table: &mut TaskTable, signs: &SharedSi
     table.add(spec, bell, vec![], Box::new(receive));
     let Some(people) = eyes.people else { return };
 
-    let mut watch = Watch::new(people.observer.even_score(), settings.people.identify);
-    for model in people.known {
-        watch.identifier().enrol(model, None);
-    }
+    let acquaintances = people.kept.map(|kept| {
+        let bell = table.bell();
+        let (keeper, acquaintances) = keeper(kept, &bell);
+        table.add(row(settings, rows::KEEPER), bell, vec![], Box::new(keeper));
+        acquaintances
+    });
+    let watch = Watch::new(people.observer.even_score(), settings.people.identify);
     let gauges = vec![pictures_end.full.gauge()];
     let detection = Detection {
         observer: people.observer,
@@ -410,6 +413,7 @@ fn open(eyes: Eyes, settings: &Settings, table: &mut TaskTable, signs: &SharedSi
         watch,
         looked: looked_end,
         last: None,
+        acquaintances,
         audience: people.audience,
         latency: table.latency("shutter to target"),
         clock: table.clock().clone(),

@@ -86,6 +86,8 @@ impl Default for IdentifierConfig {
 const FOUND_S: f64 = 1.0;
 /// A track whose distance is so many thresholds may have become somebody else's.
 const UNSURE_THRESHOLDS: f64 = 2.0;
+/// A track whose looks were hidden for longer may have become somebody else's meanwhile, seconds.
+const HIDDEN_S: f64 = 0.3;
 /// Room for so many names is made at once.
 const USUAL_TRACKS: usize = 128;
 
@@ -94,6 +96,8 @@ struct Person {
     /// Tracks of others, in order.
     blacklist: Vec<u64>,
     since_found_s: f64,
+    /// Since when nothing was seen of their looks.
+    hidden_s: f64,
     status: Status,
 }
 
@@ -127,6 +131,7 @@ impl Identifier {
             model,
             blacklist: Vec::with_capacity(USUAL_TRACKS),
             since_found_s: f64::INFINITY,
+            hidden_s: 0.0,
             status: Status {
                 person,
                 condition,
@@ -227,6 +232,7 @@ impl Person {
         self.blacklist
             .retain(|id| tracks.iter().any(|track| track.id == *id));
         self.since_found_s += dt_s;
+        self.hidden_s += dt_s;
         // A frame takes time even where the clock says none: whoever is in view sets it back.
         self.status.unseen_s += dt_s.max(f64::MIN_POSITIVE);
         self.status.distance = None;
@@ -248,6 +254,12 @@ impl Person {
         let feature = look(own);
         let distance = feature.map(|feature| self.model.distance(feature));
         let distance = distance.filter(|distance| distance.is_finite());
+        // Hidden for a moment, two people may have changed tracks: whoever comes out has to look like
+        // the person, or is searched for like everybody else.
+        let unlike = |d: f64| d > self.model.threshold();
+        if self.hidden_s > HIDDEN_S && distance.is_some_and(unlike) {
+            return;
+        }
         // A track that jumps to somebody else must not make a distractor of the person.
         let sure = distance.is_some_and(|d| d <= self.model.threshold());
         self.appear(own, distance, feature, adapts);
@@ -278,6 +290,7 @@ impl Person {
         let (Some(distance), Some(feature)) = (distance, feature) else {
             return;
         };
+        self.hidden_s = 0.0;
         let share = distance / self.model.threshold();
         self.status.confidence = (1.0 - share / 2.0).max(0.0);
         self.status.condition = match share {
@@ -462,6 +475,23 @@ mod tests {
         assert_eq!(tracks, [world.track_at(500.0), world.track_at(100.0)]);
         assert!(world.identifier.forget(second) && !world.identifier.forget(second));
         assert_eq!(world.identifier.statuses().count(), 1);
+    }
+
+    #[test]
+    fn whoever_comes_out_on_the_person_s_track_and_looks_like_somebody_else_is_not_followed() {
+        let mut world = picked();
+        for _ in 0..5 {
+            world.show(&[(300.0, BLUE)]);
+        }
+        // Half a second later somebody in blue stands where the person was.
+        world.show(&[(0.0, BLUE), (300.0, BLUE)]);
+        assert_eq!(world.status().condition, Condition::Lost);
+        // The person comes out elsewhere.
+        for _ in 0..4 {
+            world.show(&[(0.0, BLUE), (300.0, BLUE), (600.0, RED)]);
+        }
+        assert_eq!(world.status().condition, Condition::Found);
+        assert_eq!(world.status().track, world.track_at(600.0));
     }
 
     #[test]

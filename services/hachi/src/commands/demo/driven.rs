@@ -191,7 +191,7 @@ fn spectacle(
         camera,
         watcher: Watcher {
             observer,
-            known: Vec::new(),
+            kept: None,
             audience: Some(Box::new(spectator)),
         },
         seen,

@@ -28,10 +28,10 @@ const POINTS_AFTER_S: f64 = 1.5;
 const PICTURES: f64 = 9.0;
 const COLUMNS: usize = 3;
 
-/// The camera of the demo: the smallest pictures of a D455, four a second, looking up a little.
+/// The camera of the demo: the smallest pictures of a D455, five in two seconds, looking up a little.
 pub fn camera() -> CameraConfig {
     CameraConfig {
-        period_ns: 250_000_000,
+        period_ns: 400_000_000,
         ..CameraConfig::d455(424, 240, 0.2)
     }
 }
