@@ -253,6 +253,10 @@ fn read(path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
     Ok(bytes)
 }
 
+#[cfg_attr(
+    not(any(feature = "embedded", feature = "onnxruntime")),
+    allow(unused_variables, reason = "without a back end nothing is opened")
+)]
 fn open(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Box<dyn Model>, LoadError> {
     let named = std::env::var_os("ORT_DYLIB_PATH").is_some();
     let usual = match cfg!(feature = "onnxruntime") && (named || !cfg!(feature = "embedded")) {
