@@ -234,19 +234,26 @@ fn a_model_is_checked_against_its_manifest() {
     assert!(timed["median_ms"].as_f64().unwrap() > 0.0);
 }
 
+/// Follows people through a folder's images by the folder's models.
+fn tracked(folder: &Path) -> program::Run {
+    run(&[
+        "people",
+        "track",
+        text(folder),
+        "--models",
+        text(folder),
+        "--out",
+        text(&folder.join("t.txt")),
+        "--log",
+        "warn",
+    ])
+}
+
 #[test]
 fn without_a_network_it_is_said_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("1.jpg"), b"x").unwrap();
-    let failed = run(&[
-        "people",
-        "track",
-        text(folder.path()),
-        "--models",
-        text(folder.path()),
-        "--out",
-        text(&folder.path().join("t.txt")),
-    ]);
+    let failed = tracked(folder.path());
     assert!(
         failed.failure().contains("holds no detector"),
         "{}",
@@ -261,17 +268,7 @@ fn a_manifest_that_can_t_be_read_is_said() {
         std::fs::write(folder.path().join(name), b"x").unwrap();
     }
     file(folder.path(), "mine.toml", "abuot = \"a detector\"");
-    let failed = run(&[
-        "people",
-        "track",
-        text(folder.path()),
-        "--models",
-        text(folder.path()),
-        "--out",
-        text(&folder.path().join("t.txt")),
-        "--log",
-        "warn",
-    ]);
+    let failed = tracked(folder.path());
     let said = &failed.stderr;
     let named = ["model left out", "mine.toml", "abuot", "holds no detector"];
     assert!(named.iter().all(|part| said.contains(part)), "{said}");

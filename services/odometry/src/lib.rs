@@ -17,6 +17,7 @@ pub mod motion;
 pub mod odometry;
 pub mod scale;
 pub mod search;
+mod timing;
 
 pub use condition::{Condition, Doubt};
 pub use config::OdometryConfig;

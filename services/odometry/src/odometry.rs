@@ -14,6 +14,7 @@ use crate::measured::{GyroBias, from_gyroscope, from_odometry};
 use crate::motion::ScanMotion;
 use crate::scale::Scale;
 use crate::search::Search;
+use crate::timing::Timing;
 
 /// Fewer reduced points than this fix no pose.
 const LEAST_POINTS: usize = 30;
@@ -31,10 +32,6 @@ const LEAST_OVERLAP: f64 = 0.25;
 /// missing, right placements mostly reach 0.93 of the usual and more, wrong ones 0.65 to 0.9.
 const CERTAIN_SHARE: f64 = 0.92;
 const CERTAIN_OVERLAP: f64 = 0.6;
-
-/// Without a scan for longer than this share of a scan's time, scans are missing. What passes
-/// between two scans of a sensor that does not see all around is less.
-const LEAD_SHARE: f64 = 0.5;
 
 /// Scans placed in new surroundings before these become the map.
 const SETTLED: usize = 3;
@@ -160,7 +157,11 @@ impl Odometry {
         if first {
             self.choose_scale(input.points);
         }
-        let timing = self.timing(input.header);
+        let timing = Timing::of(
+            input.header,
+            self.last_end.replace(input.header.end),
+            self.config.knot_interval_s,
+        );
         self.guess(input, &timing, first);
         self.reduce(input, &timing);
         if self.source.len() < LEAST_POINTS {
@@ -228,45 +229,6 @@ impl Odometry {
 
     fn cell_for_scale(&self) -> f32 {
         (2.0 * self.scale.voxel_m()).clamp(0.5, 1.0)
-    }
-
-    fn timing(&mut self, header: &ScanHeader) -> Timing {
-        let duration_s = header.end.secs_since(header.start).max(1e-3);
-        let span_s = match self.last_end {
-            Some(last) if header.end > last => header.end.secs_since(last),
-            _ => duration_s,
-        };
-        let start = self.last_end.filter(|last| header.end > *last);
-        self.last_end = Some(header.end);
-        let start = start.unwrap_or(header.end + -((span_s * 1e9) as i64));
-        let (has_point_times, per_ns) = (header.has_point_times, (1e-9 / duration_s) as f32);
-        let without_s = (span_s - duration_s).max(0.0);
-        let knots_in = |time_s: f64, most: usize| {
-            ((time_s / self.config.knot_interval_s).round() as usize).clamp(1, most)
-        };
-        let most = hachi_registration::chain::MAX_INTERVALS;
-        let (lead_s, intervals) = match has_point_times {
-            false => (0.0, 1),
-            // Scans are missing: what the sensor did meanwhile is one interval, and the scan's own
-            // motion is cut as finely as ever.
-            true if without_s > LEAD_SHARE * duration_s => {
-                (without_s, 1 + knots_in(duration_s, most - 1))
-            }
-            true => (0.0, knots_in(span_s, most)),
-        };
-        Timing {
-            start,
-            span_s,
-            lead_s,
-            intervals,
-            from: if lead_s > 0.0 {
-                0.0
-            } else {
-                without_s / span_s
-            },
-            per_ns,
-            has_point_times,
-        }
     }
 
     /// Lays out the chain over the scan, where speed and measured motions say it went.
@@ -563,45 +525,5 @@ impl Odometry {
             fit,
             searched,
         }
-    }
-}
-
-/// How a scan lies in time between the end of the one before and its own.
-#[derive(Debug, Clone, Copy)]
-struct Timing {
-    start: Stamp,
-    span_s: f64,
-    /// How long no scan was taken before this one, where that is an interval of its own; or 0.
-    lead_s: f64,
-    intervals: usize,
-    /// Share of the intervals' time before the scan's first point.
-    from: f64,
-    /// Share of the scan in a nanosecond.
-    per_ns: f32,
-    has_point_times: bool,
-}
-
-impl Timing {
-    /// How many intervals lie before the scan.
-    fn leads(&self) -> usize {
-        usize::from(self.lead_s > 0.0)
-    }
-
-    /// Of the chain's poses those of the scan itself.
-    fn own<'a>(&self, poses: &'a [Pose]) -> &'a [Pose] {
-        &poses[self.leads().min(poses.len() - 1)..]
-    }
-
-    /// When the chain's `i`-th knot is.
-    fn knot(&self, i: usize) -> Stamp {
-        let lead = self.leads();
-        let after = match i.checked_sub(lead) {
-            None => 0.0,
-            Some(i) => {
-                let share = i as f64 / (self.intervals - lead) as f64;
-                self.lead_s + (self.span_s - self.lead_s) * share
-            }
-        };
-        self.start + (after * 1e9).round() as i64
     }
 }

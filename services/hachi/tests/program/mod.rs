@@ -1,5 +1,5 @@
 //! The built program, run as a user runs it.
-#![allow(dead_code)] // each test file uses its own part of this
+#![allow(dead_code, reason = "each test file uses its own part of this")]
 
 pub mod scenes;
 

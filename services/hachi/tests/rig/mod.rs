@@ -1,5 +1,5 @@
 //! A simulated robot and the service that drives it, as two processes with sockets between them.
-#![allow(dead_code)] // each test file uses its own part of this
+#![allow(dead_code, reason = "each test file uses its own part of this")]
 
 use std::io::{BufRead, BufReader, Read};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};

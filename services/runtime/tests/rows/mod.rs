@@ -1,5 +1,5 @@
 //! Rows of task tables for tests.
-#![allow(dead_code)] // each test file uses its own part of this
+#![allow(dead_code, reason = "each test file uses its own part of this")]
 
 use hachi_runtime::{Overrun, TaskSpec, Trigger};
 

@@ -1,5 +1,5 @@
 //! People to keep, and every byte of a folder.
-#![allow(dead_code)] // each test file uses its own part of this
+#![allow(dead_code, reason = "each test file uses its own part of this")]
 
 use std::path::Path;
 
