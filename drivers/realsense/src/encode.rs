@@ -1,8 +1,8 @@
 //! The other direction: what a camera says, as its own bytes.
 //!
 //! In: pictures, times, calibration. Out: buffers, tables and answers that the decoders read back,
-//! byte for byte what a camera would send. Tests and fuzz targets share this. A simulator that is to
-//! check the decoders writes its pictures itself.
+//! byte for byte what a camera would send. The simulated camera, tests and fuzz targets share
+//! this; pictures come as bytes from whoever renders them.
 
 use hachi_hal::{Distortion, Intrinsics, Pose};
 

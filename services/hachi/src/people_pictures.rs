@@ -167,22 +167,12 @@ impl ContactSheet {
 /// It can't be written.
 pub fn write_png(path: &Path, picture: &Rgb) -> Result<(), Failure> {
     let mut file = AtomicFile::create(path).map_err(|error| Failure::unwritten(&error))?;
-    let bytes = png_bytes(picture).map_err(|error| Failure::new(error, "please report this"))?;
+    let bytes = picture
+        .to_png()
+        .map_err(|error| Failure::new(error, "please report this"))?;
     file.write(&bytes)
         .map_err(|error| Failure::unwritten(&error))?;
     file.commit().map_err(|error| Failure::unwritten(&error))
-}
-
-fn png_bytes(picture: &Rgb) -> Result<Vec<u8>, png::EncodingError> {
-    let mut bytes = Vec::new();
-    let [width, height] = [picture.width, picture.height].map(|n| u32::try_from(n).unwrap_or(0));
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&picture.pixels)?;
-    writer.finish()?;
-    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -100,6 +100,15 @@ impl From<&Score> for Figure {
     }
 }
 
+impl Figure {
+    /// Whether the person was known again soon enough; who is never known again is not.
+    fn is_prompt(&self) -> bool {
+        let needed = self.re_identifications_needed;
+        self.mean_delay_s
+            .map_or(needed == 0, |delay_s| delay_s < MOST_DELAY_S)
+    }
+}
+
 /// Scores of the three ways, in their order.
 type Scores = [Score; 3];
 
@@ -178,8 +187,7 @@ fn report(seed: u64, watched: &[(Script, Watched)]) -> Report {
         time += watched.time;
     }
     let all = figures(&all);
-    let kept = all.carpe_id.wrong_s_per_hour < MOST_WRONG_S_PER_HOUR
-        && all.carpe_id.mean_delay_s.unwrap_or(0.0) < MOST_DELAY_S;
+    let kept = all.carpe_id.wrong_s_per_hour < MOST_WRONG_S_PER_HOUR && all.carpe_id.is_prompt();
     Report {
         seed,
         scenes: watched

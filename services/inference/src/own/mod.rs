@@ -3,7 +3,7 @@
 //!
 //! They have seen nothing but renderings of Hachi's simulated world and are of use there alone:
 //! with them the simulated robot goes through real inference with nothing installed. How they are
-//! trained and how good they are stands in `training/README.md`. Out: their bytes and manifests,
+//! trained stands in `training/README.md`, how good they are in `BENCHMARKS.md`. Out: their bytes and manifests,
 //! which are checked like those of any file ([`crate::load()`] knows them by [`Own::name`]).
 
 use std::path::Path;

@@ -3,7 +3,7 @@
 //!
 //! ```sh
 //! cargo run --release -p hachi-world --example render_people -- scenes FOLDER --seed 1000 --count 70
-//! cargo run --release -p hachi-world --example render_people -- portraits FOLDER --seed 1000 --count 1500
+//! cargo run --release -p hachi-world --example render_people -- portraits FOLDER --seed 1000 --count 700
 //! ```
 //!
 //! Every building, and every person of the portraits, has a seed of its own, counted from `--seed`:

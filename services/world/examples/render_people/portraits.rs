@@ -35,6 +35,8 @@ pub fn render(folder: &Path, first_seed: u64, people: u64) -> std::io::Result<()
     let mut simulation = empty_place();
     for seed in first_seed..first_seed + people {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
+        // Else they would be the first people of the buildings with the same seeds.
+        random.set_stream(1);
         let somebody = person(FIRST_ID + seed as u32, None, &mut random);
         for _ in 0..EACH {
             portrait(&somebody, &mut simulation, &mut random, &mut file)?;

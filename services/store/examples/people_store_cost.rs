@@ -1,4 +1,4 @@
-//! How long the store of people takes: `cargo run --release -p hachi-store --example people_figures
+//! How long the store of people takes: `cargo run --release -p hachi-store --example people_store_cost
 //! [FOLDER]`, on the disk of that folder.
 //!
 //! Models have 512 numbers, pictures 60 kB, as those of a small re-identification network's crops.

@@ -1,7 +1,7 @@
 //! How well networks find people in rendered pictures and tell them apart, through Hachi's own
 //! decoders, masks and crops.
 //!
-//! `cargo run --release -p hachi-tests --example people_figures -- FOLDER [DETECTOR REID]`: a folder
+//! `cargo run --release -p hachi-tests --example people_networks -- FOLDER [DETECTOR REID]`: a folder
 //! that `render_people` has written; the networks in the program itself unless others are named.
 //!
 //! Found is who has a box of the same person with an overlap of half; average precision as in
