@@ -8,7 +8,8 @@
 //! The inputs themselves have no age: the node sends them when they change, and with a living
 //! heartbeat the last ones stand for as long as that takes. A frame with them that is lost is lost
 //! until they change again, so that nothing may overflow on their way: have the kernel leave out all
-//! but [`StopNodeConfig::ids`].
+//! but [`StopNodeConfig::ids`]. After a silence they are no longer known, and are asked for by
+//! [`StopNode::asks`].
 
 use hachi_hal::Stamp;
 
@@ -171,6 +172,10 @@ impl StopNode {
                 }
                 _ => return Err(StopFrameError::State { got: state }),
             }
+            // What it sent while nothing came through is lost.
+            if self.is_silent(received) {
+                self.inputs = None;
+            }
             self.heard = Some(received);
         } else if id == INPUTS + node {
             let &inputs = data.first().ok_or(length(1))?;
@@ -188,12 +193,10 @@ impl StopNode {
 
     /// Why the robot must stand still at `now`; `None` if it may move.
     pub fn reason(&self, now: Stamp) -> Option<StopReason> {
-        let Some(heard) = self.heard else {
+        if self.heard.is_none() {
             return Some(StopReason::NeverHeard);
-        };
-        // A stamp from the future is another clock, and no sign of life.
-        let age_ns = now.nanos_since(heard);
-        if !(0..=self.config.heartbeat_limit_ns).contains(&age_ns) {
+        }
+        if self.is_silent(now) {
             return Some(StopReason::Silent);
         }
         if !self.operational {
@@ -210,6 +213,22 @@ impl StopNode {
             0 => Some(StopReason::Pressed),
             _ => Some(StopReason::Disagree),
         }
+    }
+
+    /// The frame that asks for the inputs, where the node is in operation and they are not known: it
+    /// sends them when they change, which a healthy one may never do.
+    pub fn asks(&self) -> Option<CanFrame> {
+        let unknown = self.operational && self.inputs.is_none();
+        let request = CanFrame::request(INPUTS + u16::from(self.config.node))?;
+        unknown.then_some(request)
+    }
+
+    /// Whether the last heartbeat is too old at `now`, or none at all: a stamp from the future is
+    /// another clock, and no sign of life.
+    fn is_silent(&self, now: Stamp) -> bool {
+        let limit_ns = self.config.heartbeat_limit_ns;
+        let age_ns = self.heard.map(|heard| now.nanos_since(heard));
+        !age_ns.is_some_and(|age_ns| (0..=limit_ns).contains(&age_ns))
     }
 
     /// When its silence becomes a stop, if it moves now and nothing comes.

@@ -201,6 +201,21 @@ fn frames_of_others_and_damaged_ones_are_no_sign_of_life() {
 /// CiA 301: emergency under 80h, the first inputs under 180h, the heartbeat under 700h, each with the
 /// node's number added.
 #[test]
+fn inputs_are_asked_for_where_they_are_not_known_and_again_after_a_silence() {
+    let request = CanFrame::request(0x185);
+    let mut node = stop(&[]);
+    assert_eq!(node.asks(), None, "nobody is there");
+    node.take(&frame(0x705, &[0x05]), at(0)).unwrap();
+    assert_eq!(node.asks(), request);
+    node.take(&frame(0x185, &[0b11]), at(1)).unwrap();
+    assert_eq!((node.asks(), node.reason(at(1))), (None, None));
+    // Pressed at 400 ms, while nothing came through.
+    node.take(&frame(0x705, &[0x05]), at(600)).unwrap();
+    assert_eq!(node.reason(at(600)), Some(StopReason::InputsUnknown));
+    assert_eq!(node.asks(), request);
+}
+
+#[test]
 fn a_stop_listens_to_three_identifiers_and_no_other() {
     let config = StopNodeConfig {
         node: 5,

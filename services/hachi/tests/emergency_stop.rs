@@ -29,6 +29,8 @@ const MS: i64 = 1_000_000;
 #[derive(Debug, Clone, Copy, Default)]
 struct Node {
     powered: bool,
+    /// Nothing that it sends arrives, and it goes on sending.
+    cut_off: bool,
     /// Of its first two inputs, a bit each.
     closed: u8,
     bus_down: bool,
@@ -40,8 +42,10 @@ struct Node {
 struct Bus(Arc<Mutex<Node>>, VirtualClock);
 
 impl CanBus for Bus {
-    fn send(&mut self, _: &CanFrame) -> Result<(), BusError> {
-        Err(BusError::Full)
+    fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
+        assert_eq!(CanFrame::request(0x185), Some(*frame));
+        self.0.lock().unwrap().told = None;
+        Ok(())
     }
 
     fn receive(&mut self, limit: Duration) -> Result<Option<Received>, BusError> {
@@ -53,6 +57,10 @@ impl CanBus for Bus {
         }
         if !node.powered {
             node.told = None;
+            return Ok(None);
+        }
+        if node.cut_off {
+            node.told = Some(node.closed);
             return Ok(None);
         }
         // Node 5 in operation, CiA 301; its inputs, CiA 401.
@@ -170,6 +178,7 @@ impl Rig {
 
 const CLOSED: Node = Node {
     powered: true,
+    cut_off: false,
     closed: 0b11,
     bus_down: false,
     told: None,
@@ -218,6 +227,23 @@ fn a_silent_stop_node_is_taken_for_pressed_and_one_that_comes_back_lets_the_robo
 }
 
 #[test]
+fn a_stop_that_is_pressed_while_its_cable_is_out_is_pressed_when_it_is_back() {
+    let mut rig = Rig::new(CLOSED);
+    rig.pass(1_000 * MS);
+    rig.walks();
+    rig.set(|node| {
+        node.cut_off = true;
+        node.closed = 0;
+    });
+    rig.stops_after(Cause::EmergencyStop);
+    rig.pass(500 * MS);
+    rig.set(|node| node.cut_off = false);
+    rig.stands();
+    rig.set(|node| node.closed = 0b11);
+    rig.walks();
+}
+
+#[test]
 fn a_can_bus_that_goes_down_stops_the_robot_and_is_opened_anew() {
     let mut rig = Rig::new(CLOSED);
     rig.pass(1_000 * MS);
@@ -226,10 +252,7 @@ fn a_can_bus_that_goes_down_stops_the_robot_and_is_opened_anew() {
     let noticed = rig.stops_after(Cause::EmergencyStop);
     assert!(noticed <= 15 * MS, "{noticed} ns");
     rig.stands();
-    rig.set(|node| {
-        node.bus_down = false;
-        node.told = None;
-    });
+    rig.set(|node| node.bus_down = false);
     rig.walks();
 }
 

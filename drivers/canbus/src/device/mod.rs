@@ -28,8 +28,12 @@ pub struct CanStop<B, C> {
     clock: C,
     node: StopNode,
     last: Option<Stamp>,
+    asked: Option<Stamp>,
     bad_frames: u64,
 }
+
+/// From one time that the inputs are asked for to the next, ns.
+const ASKED_EVERY_NS: i64 = 100_000_000;
 
 impl<B: CanBus, C: Clock> CanStop<B, C> {
     /// A stop behind a node on `bus`, which on a real robot is opened by
@@ -40,6 +44,7 @@ impl<B: CanBus, C: Clock> CanStop<B, C> {
             clock,
             node: StopNode::new(config)?,
             last: None,
+            asked: None,
             bad_frames: 0,
         })
     }
@@ -52,6 +57,21 @@ impl<B: CanBus, C: Clock> CanStop<B, C> {
     /// Frames of the node that could not be understood.
     pub fn bad_frames(&self) -> u64 {
         self.bad_frames
+    }
+
+    /// Asks the node for its inputs, where they are not known.
+    fn ask(&mut self) -> Result<(), BusError> {
+        let now = self.clock.now();
+        let waits = |asked: Stamp| now.nanos_since(asked) < ASKED_EVERY_NS;
+        let Some(request) = self.node.asks().filter(|_| !self.asked.is_some_and(waits)) else {
+            return Ok(());
+        };
+        self.asked = Some(now);
+        match self.bus.send(&request) {
+            // It is asked again.
+            Ok(()) | Err(BusError::Full) => Ok(()),
+            Err(error) => Err(error),
+        }
     }
 
     fn sample(&mut self, at: Stamp) -> StopSample {
@@ -69,6 +89,7 @@ impl<B: CanBus, C: Clock> EmergencyStop for CanStop<B, C> {
 
     fn read_stop(&mut self, deadline: Stamp) -> Result<Option<StopSample>, BusError> {
         loop {
+            self.ask()?;
             // Falling silent is news: it is not waited for longer than until then.
             let moving = self.reason().is_none();
             let silent_at = self.node.falls_silent_at().filter(|_| moving);
