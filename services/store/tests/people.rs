@@ -127,8 +127,11 @@ fn what_is_no_store_and_keys_that_do_not_fit_are_refused_with_what_to_do() {
     let other = rusqlite::Connection::open(at("other.db").file).unwrap();
     other.execute_batch("CREATE TABLE person (id)").unwrap();
     drop(other);
+    let before = std::fs::read(at("other.db").file).unwrap();
     let other = refused(&at("other.db"));
     assert!(matches!(other, PeopleError::NotAStore { .. }), "{other:?}");
+    let after = std::fs::read(at("other.db").file).unwrap();
+    assert!(before == after, "what is not ours is left as it is");
     std::fs::create_dir(at("folder.db").file).unwrap();
     let dir = refused(&at("folder.db"));
     assert!(matches!(dir, PeopleError::NotAStore { .. }), "{dir:?}");

@@ -38,7 +38,7 @@ pub struct EmergencyStopTask {
     pub signs: SharedSigns,
     /// The stop, while its bus is up.
     pub stop: Option<CanStop<Bus, TaskClock>>,
-    /// When the bus is opened next.
+    /// When the bus is opened next; kept until it is read without a fault.
     pub opens_at: Option<Stamp>,
     /// Why the robot must stand when it was last said; the bus being down is a node unheard.
     pub said: Option<StopReason>,
@@ -83,9 +83,6 @@ impl EmergencyStopTask {
         }
         match (self.open)() {
             Ok(bus) => {
-                if self.opens_at.take().is_some() {
-                    info!("the emergency stop's bus is there again");
-                }
                 // The settings were checked: such a node there can be.
                 self.stop = CanStop::new(bus, self.clock.clone(), self.config);
             }
@@ -105,10 +102,19 @@ impl EmergencyStopTask {
         };
         for _ in 0..MOST_AT_ONCE {
             match stop.read_stop(now) {
-                Ok(Some(_)) => {}
-                Ok(None) => return,
+                // An interface that is down opens, and fails when it is read.
+                Ok(heard) => {
+                    if self.opens_at.take().is_some() {
+                        info!("the emergency stop's bus is there again");
+                    }
+                    if heard.is_none() {
+                        return;
+                    }
+                }
                 Err(error) => {
-                    warn!(%error, "the emergency stop's bus fails");
+                    if self.opens_at.is_none() {
+                        warn!(%error, "the emergency stop's bus fails");
+                    }
                     self.stop = None;
                     self.opens_at = Some(now + AGAIN_NS);
                     return;

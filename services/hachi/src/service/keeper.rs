@@ -79,27 +79,30 @@ pub fn keeper(kept: Kept, bell: &Bell) -> (Keeper, Acquaintances) {
 
 impl Work for Keeper {
     fn run(&mut self, _: Stamp) -> Progress {
-        let outcome = self.save().and_then(|()| self.look_through());
-        let failed = match outcome {
-            // Another program writes: it is tried again.
-            Ok(()) | Err(PeopleError::InUse { .. }) => false,
+        let saved = self.save();
+        let looked = self.look_through();
+        match saved.and_then(|saved| looked.map(|()| saved)) {
+            // Another program writes: it is tried again. Nothing to save proves nothing.
+            Err(PeopleError::InUse { .. }) | Ok(false) => {}
+            Ok(true) => {
+                if std::mem::take(&mut self.failing) {
+                    info!("what people look like is kept again");
+                }
+            }
             Err(error) => {
-                if !self.failing {
+                if !std::mem::replace(&mut self.failing, true) {
                     warn!(%error, "what people look like can't be kept");
                 }
-                true
             }
-        };
-        if self.failing && !failed {
-            info!("what people look like is kept again");
         }
-        self.failing = failed;
         Progress::Done
     }
 }
 
 impl Keeper {
-    fn save(&mut self) -> Result<(), PeopleError> {
+    /// Whether there was anything to save.
+    fn save(&mut self) -> Result<bool, PeopleError> {
+        let mut saved = false;
         while let Some((id, model)) = self.looks.receive() {
             let Some(person) = self.people.iter().find(|person| person.id == id) else {
                 continue;
@@ -107,11 +110,12 @@ impl Keeper {
             let Kept { store, network } = &mut self.kept;
             match store.save_model(person, network, &model) {
                 // Forgotten meanwhile: the store says so below.
-                Ok(()) | Err(PeopleError::Unknown { .. }) => {}
+                Ok(()) => saved = true,
+                Err(PeopleError::Unknown { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
-        Ok(())
+        Ok(saved)
     }
 
     /// Tells tracking what changed in the store.

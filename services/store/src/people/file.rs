@@ -90,9 +90,11 @@ impl PeopleFile {
         let problem = |error: rusqlite::Error| PeopleError::of(path, &error);
         let mut connection = tables::connect(path).map_err(problem)?;
         if tables::is_new(&connection).map_err(problem)? {
+            tables::settle(&connection).map_err(problem)?;
             make(&mut connection, paths)?;
         }
         tables::check_kind(&connection, path)?;
+        tables::settle(&connection).map_err(problem)?;
         let mut store = Self {
             paths: paths.clone(),
             connection,

@@ -30,17 +30,22 @@ INSERT INTO about VALUES ('unclean', 0);
 
 const NAMES: [&str; 4] = ["about", "person", "model", "image"];
 
-/// Opens the data base: every change on the disk when it is done, nothing deleted left in it.
+/// Opens the data base and changes nothing of it.
 pub(super) fn connect(path: &Path) -> rusqlite::Result<Connection> {
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = Connection::open_with_flags(path, flags)?;
     connection.busy_timeout(PATIENCE)?;
     schema::guard(&connection, LARGEST_VALUE)?;
+    Ok(connection)
+}
+
+/// Every change on the disk when it is done, nothing deleted left in it. It changes the file: for a
+/// new one or a store of ours alone.
+pub(super) fn settle(connection: &Connection) -> rusqlite::Result<()> {
     connection.pragma_update(None, "temp_store", "MEMORY")?;
     connection.pragma_update(None, "secure_delete", true)?;
     connection.pragma_update(None, "journal_mode", "WAL")?;
-    connection.pragma_update(None, "synchronous", "FULL")?;
-    Ok(connection)
+    connection.pragma_update(None, "synchronous", "FULL")
 }
 
 /// Whether nothing was ever written to it.

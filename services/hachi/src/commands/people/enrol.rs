@@ -127,7 +127,7 @@ fn files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 
 /// A crop as it is kept.
 fn kept(mut crop: Rgb) -> Result<Vec<u8>, String> {
-    while crop.height > MOST_HIGH && crop.width > 1 {
+    while crop.height.max(crop.width) > MOST_HIGH && crop.height.min(crop.width) > 1 {
         crop = crop.halved();
     }
     crop.to_png().map_err(|error| error.to_string())
