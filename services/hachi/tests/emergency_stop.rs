@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use hachi::config::{MotionInput, Settings};
-use hachi::service::emergency_stop::OpenBus;
+use hachi::service::emergency_stop::{OpenBus, StopBus};
 use hachi::service::settings::Platform;
 use hachi::service::signs::SharedSigns;
-use hachi::service::simulated::{Besides, connect_with};
+use hachi::service::simulated::{Besides, connect};
 use hachi::service::simulator::Truth;
 use hachi::service::wiring::Running;
 use hachi_behaviour::Cause;
@@ -105,7 +105,12 @@ impl Rig {
             true => Err(BusError::Down(std::io::ErrorKind::NetworkDown.into())),
             false => Ok(Box::new(bus.clone())),
         });
-        let (service, truth) = connect_with(
+        let (_, node_config) = settings.emergency_stop.node().unwrap();
+        let stop_bus = StopBus {
+            node: node_config,
+            open,
+        };
+        let (service, truth) = connect(
             &settings,
             &platform,
             &world,
@@ -113,7 +118,7 @@ impl Rig {
             Running::VirtualTime,
             (slam, None),
             Besides {
-                stop_bus: Some(open),
+                stop_bus: Some(stop_bus),
                 ..Besides::default()
             },
         )

@@ -5,7 +5,7 @@
 use hachi::config::{MotionInput, Settings};
 use hachi::service::settings::Platform;
 use hachi::service::signs::SharedSigns;
-use hachi::service::simulated::{Besides, Spectacle, connect_with};
+use hachi::service::simulated::{Besides, WatchedCamera, connect};
 use hachi::service::simulator::SeenPeople;
 use hachi::service::wiring::{Running, Watcher};
 use hachi_behaviour::Cause;
@@ -83,7 +83,7 @@ impl Rig {
             ..CameraConfig::d455(424, 240, 0.2)
         };
         let port = SimulatedPort::new(camera.geometry);
-        let people = Spectacle {
+        let watched = WatchedCamera {
             camera,
             port: port.clone(),
             watcher: Watcher {
@@ -94,10 +94,10 @@ impl Rig {
             seen: SeenPeople::default(),
         };
         let besides = Besides {
-            people: Some(people),
+            camera: Some(watched),
             ..Besides::default()
         };
-        let (service, _) = connect_with(
+        let (service, _) = connect(
             &settings,
             &platform,
             &world,

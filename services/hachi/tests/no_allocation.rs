@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use hachi::config::{MotionInput, Settings};
 use hachi::service::settings::Platform;
-use hachi::service::simulated::connect;
+use hachi::service::simulated::{Besides, connect};
 use hachi::service::wiring::Running;
 use hachi_hal::Stamp;
 use hachi_runtime::executor::virtual_time::VirtualTime;
@@ -41,8 +41,16 @@ fn the_tasks_of_a_walking_robot_allocate_nothing_once_warm() {
     let slam = Slam::new(settings.slam.clone(), Box::new(MemoryStore::default()));
     // As with threads: without an end, so that no path is kept.
     let running = Running::Threads(1);
-    let (service, _) =
-        connect(&settings, &platform, &world, &clock, running, (slam, None)).unwrap();
+    let (service, _) = connect(
+        &settings,
+        &platform,
+        &world,
+        &clock,
+        running,
+        (slam, None),
+        Besides::default(),
+    )
+    .unwrap();
 
     // Asked after each run: what was allocated since the last one is that task's.
     let counts: Arc<Mutex<BTreeMap<&'static str, usize>>> = Arc::default();

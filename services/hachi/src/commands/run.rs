@@ -30,7 +30,7 @@ use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::recorder::Recorder;
-use crate::service::emergency_stop::OpenBus;
+use crate::service::emergency_stop::StopBus;
 use crate::service::eyes;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
@@ -244,7 +244,7 @@ fn stop_line(platform: &Platform, address: SocketAddr) -> Result<StopLine, Failu
 
 /// The bus of the emergency stop's node, where the settings name one. It is opened here once: a name
 /// that is wrong is better known at the start than while the robot stands and nobody knows why.
-fn stop_bus(settings: &Settings) -> Result<Option<OpenBus>, Failure> {
+fn stop_bus(settings: &Settings) -> Result<Option<StopBus>, Failure> {
     let Some((interface, node)) = settings.emergency_stop.node() else {
         return Ok(None);
     };
@@ -255,10 +255,11 @@ fn stop_bus(settings: &Settings) -> Result<Option<OpenBus>, Failure> {
             "correct emergency_stop.can, or take it out where there is no such stop",
         )
     })?);
-    Ok(Some(Box::new(move || match opened.take() {
+    let open = Box::new(move || match opened.take() {
         Some(bus) => Ok(bus),
         None => can::open(&interface, &ids),
-    })))
+    });
+    Ok(Some(StopBus { node, open }))
 }
 
 fn udp_of(settings: &Settings) -> UdpConfig {

@@ -18,6 +18,14 @@ pub type Bus = Box<dyn CanBus + Send>;
 /// Opens the bus, again and again.
 pub type OpenBus = Box<dyn FnMut() -> Result<Bus, BusError> + Send>;
 
+/// A stop's node and its bus.
+pub struct StopBus {
+    /// How the stop is wired.
+    pub node: StopNodeConfig,
+    /// Opens the bus.
+    pub open: OpenBus,
+}
+
 /// Frames taken in at one run: the node sends one every 100 ms and one for each change.
 const MOST_AT_ONCE: usize = 8;
 
@@ -26,10 +34,8 @@ const AGAIN_NS: i64 = 500_000_000;
 
 /// The task.
 pub struct EmergencyStopTask {
-    /// Opens the bus.
-    pub open: OpenBus,
-    /// How the stop is wired.
-    pub config: StopNodeConfig,
+    /// The node and its bus.
+    pub bus: StopBus,
     /// The robot's clock.
     pub clock: TaskClock,
     /// To the base command task.
@@ -81,10 +87,10 @@ impl EmergencyStopTask {
         if self.stop.is_some() || self.opens_at.is_some_and(|at| now < at) {
             return;
         }
-        match (self.open)() {
+        match (self.bus.open)() {
             Ok(bus) => {
                 // The settings were checked: such a node there can be.
-                self.stop = CanStop::new(bus, self.clock.clone(), self.config);
+                self.stop = CanStop::new(bus, self.clock.clone(), self.bus.node);
             }
             Err(error) => {
                 if self.opens_at.is_none() {

@@ -15,7 +15,7 @@ use hachi_unitree::device::{HighClient, MemoryLink, SimulatedRobotConfig, Simula
 use hachi_world::{CameraConfig, LiveLidar, SensorKind, SimulatedCamera, SimulationConfig};
 
 use super::camera::ColorOf;
-use super::emergency_stop::OpenBus;
+use super::emergency_stop::StopBus;
 use super::settings::Platform;
 use super::simulator::{
     MemoryPackets, SeenPeople, SimulatedEye, SimulatorTask, Truth, WalkingBody,
@@ -52,13 +52,13 @@ pub fn sensor_of(world: &SimulationConfig) -> Sensor {
 #[derive(Default)]
 pub struct Besides {
     /// A camera.
-    pub people: Option<Spectacle>,
-    /// An emergency stop's node on a bus.
-    pub stop_bus: Option<OpenBus>,
+    pub camera: Option<WatchedCamera>,
+    /// An emergency stop's node and its bus.
+    pub stop_bus: Option<StopBus>,
 }
 
 /// A camera on the simulated robot, and who sees what it sees.
-pub struct Spectacle {
+pub struct WatchedCamera {
     /// The camera.
     pub camera: CameraConfig,
     /// Its cable.
@@ -69,7 +69,7 @@ pub struct Spectacle {
     pub seen: SeenPeople,
 }
 
-impl Spectacle {
+impl WatchedCamera {
     /// The service's end of the cable, and the camera's.
     fn open(self, world: &SimulationConfig) -> (Eyes, SimulatedEye) {
         let geometry = self.camera.geometry;
@@ -96,34 +96,12 @@ impl Spectacle {
     }
 }
 
-/// The service on one end of the wires, the simulated robot on the other; and where that truly is.
+/// The service on one end of the wires, the simulated robot with what it has besides on the other; and
+/// where that truly is.
 ///
 /// # Errors
 /// The settings do not fit together.
 pub fn connect(
-    settings: &Settings,
-    platform: &Platform,
-    world: &SimulationConfig,
-    clock: &VirtualClock,
-    running: Running,
-    kept: (Slam, Option<Recorder>),
-) -> Result<(Service, Truth), Failure> {
-    connect_with(
-        settings,
-        platform,
-        world,
-        clock,
-        running,
-        kept,
-        Besides::default(),
-    )
-}
-
-/// As [`connect`], with what a robot may have besides.
-///
-/// # Errors
-/// As there.
-pub fn connect_with(
     settings: &Settings,
     platform: &Platform,
     world: &SimulationConfig,
@@ -138,7 +116,7 @@ pub fn connect_with(
     let robot = platform.robot;
     let client = HighClient::over(robot, platform.client(&settings.robot), link.clone())
         .map_err(|error| Failure::new(error, "please report this"))?;
-    let (eyes, eye) = besides.people.map(|people| people.open(world)).unzip();
+    let (eyes, eye) = besides.camera.map(|camera| camera.open(world)).unzip();
     let devices = Devices {
         eyes,
         platform: *platform,

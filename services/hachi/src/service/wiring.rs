@@ -35,7 +35,7 @@ use super::body::UnitreeBody;
 use super::camera::{CameraReceive, PictureSource};
 use super::crew::Crew;
 use super::detection::Detection;
-use super::emergency_stop::{EmergencyStopTask, OpenBus};
+use super::emergency_stop::{EmergencyStopTask, StopBus};
 use super::filter::Filter;
 use super::keeper::{Kept as KeptPeople, keeper};
 use super::legs::Legs;
@@ -68,8 +68,8 @@ pub struct Devices<P, L> {
     pub packets: P,
     /// Which sensor sends them.
     pub sensor: Sensor,
-    /// The bus of the emergency stop's node, where the settings name one.
-    pub stop_bus: Option<OpenBus>,
+    /// The emergency stop's node and its bus, where the settings name one.
+    pub stop_bus: Option<StopBus>,
     /// The camera, where there is to be one.
     pub eyes: Option<Eyes>,
 }
@@ -215,11 +215,9 @@ where
     table.add(spec, bell, vec![], Box::new(base_command));
 
     let has_stop_node = devices.stop_bus.is_some();
-    if let Some(open) = devices.stop_bus {
-        let (_, config) = settings.emergency_stop.node().unwrap_or_default();
+    if let Some(bus) = devices.stop_bus {
         let task = EmergencyStopTask {
-            open,
-            config,
+            bus,
             clock: table.clock().clone(),
             out: to_stop,
             signs: Arc::clone(&signs),

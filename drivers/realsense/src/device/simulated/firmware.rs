@@ -1,4 +1,7 @@
 //! A RealSense's firmware: what it answers when the driver asks for itself, its tables and its unit.
+//!
+//! Commands and tables are bare numbers as the maker's library has them: a driver that had one of its
+//! own wrong would not be answered.
 
 use crate::controls::{Query, Selector};
 use crate::encode;

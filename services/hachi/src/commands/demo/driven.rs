@@ -31,7 +31,7 @@ use crate::mapping::Ended;
 use crate::recorder::Recorder;
 use crate::results::Results;
 use crate::service::signs::SharedSigns;
-use crate::service::simulated::{Besides, Spectacle, connect_with, sensor_of};
+use crate::service::simulated::{Besides, WatchedCamera, connect, sensor_of};
 use crate::service::simulator::{SeenPeople, Truth, route};
 use crate::service::web::Status;
 use crate::service::wiring::{Running, Service, Watcher};
@@ -80,8 +80,8 @@ pub fn walk(
         None => None,
     };
     let running = Running::VirtualTime;
-    let (spectacle, album) = spectacle(arguments, &world).unzip();
-    let (service, truth) = connect_with(
+    let (camera, album) = camera(arguments, &world).unzip();
+    let (service, truth) = connect(
         &settings,
         &platform,
         &world,
@@ -89,7 +89,7 @@ pub fn walk(
         running,
         (slam, recorder),
         Besides {
-            people: spectacle,
+            camera,
             ..Besides::default()
         },
     )?;
@@ -169,10 +169,10 @@ pub fn walk(
 
 /// The camera, the networks behind it and who sees it, where somebody walks about to be seen; and what
 /// will have been seen. Without networks nobody is looked for, which the log says.
-fn spectacle(
+fn camera(
     arguments: &DemoArguments,
     world: &SimulationConfig,
-) -> Option<(Spectacle, Arc<Mutex<Album>>)> {
+) -> Option<(WatchedCamera, Arc<Mutex<Album>>)> {
     if world.people.is_empty() {
         return None;
     }
@@ -186,7 +186,7 @@ fn spectacle(
     let seen = SeenPeople::default();
     let (spectator, album) = Spectator::new(seen.clone(), world.start, arguments.seconds);
     let camera = people::camera();
-    let spectacle = Spectacle {
+    let watched = WatchedCamera {
         port: SimulatedPort::new(camera.geometry),
         camera,
         watcher: Watcher {
@@ -196,7 +196,7 @@ fn spectacle(
         },
         seen,
     };
-    Some((spectacle, album))
+    Some((watched, album))
 }
 
 /// Where the robot truly was at the trajectory's times, in its frame: the base at the first scan.
