@@ -59,17 +59,19 @@ impl Rgb {
         })
     }
 
-    /// The image at half its size; each pixel is the mean of four.
-    pub fn halved(&self) -> Self {
-        let (width, height) = (self.width / 2, self.height / 2);
-        let at = |x: usize, y: usize, colour: usize| {
-            u16::from(self.pixels[3 * (y * self.width + x) + colour])
-        };
+    /// The image so many times smaller: each pixel is the mean of a square with sides of `by`. What is
+    /// left over at the right and below is dropped.
+    pub fn shrunk(&self, by: usize) -> Self {
+        let by = by.max(1);
+        let (width, height) = (self.width / by, self.height / by);
         let mut pixels = Vec::with_capacity(3 * width * height);
-        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (2 * y, 2 * x))) {
-            pixels.extend((0..3).map(|c| {
-                let sum = at(x, y, c) + at(x + 1, y, c) + at(x, y + 1, c) + at(x + 1, y + 1, c);
-                (sum / 4) as u8
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y * by, x * by))) {
+            pixels.extend([0, 1, 2].map(|channel| {
+                let rows = (y..y + by).map(|y| &self.pixels[3 * (y * self.width + x)..][..3 * by]);
+                let values = rows.flat_map(|row| row[channel..].iter().step_by(3));
+                let sum: usize = values.map(|&value| usize::from(value)).sum();
+                // The mean of bytes is one.
+                (sum / (by * by)) as u8
             }));
         }
         Self {
@@ -272,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_out_halved_and_written_has_the_pixels_it_had() {
+    fn what_is_cut_out_shrunk_and_written_has_the_pixels_it_had() {
         let image = Rgb {
             width: 4,
             height: 2,
@@ -284,8 +286,22 @@ mod tests {
         assert_eq!(image.cut(&BoundingBox::new(4.0, 0.0, 2.0, 2.0)), None);
         assert_eq!(image.cut(&BoundingBox::new(f64::NAN, 0.0, 0.0, 2.0)), None);
         // Means of (0, 3, 12, 15) and so on, by hand.
-        assert_eq!(image.halved().pixels, [7, 8, 9, 13, 14, 15]);
+        assert_eq!(image.shrunk(2).pixels, [7, 8, 9, 13, 14, 15]);
         assert_eq!(decode(&image.to_png().unwrap()), Ok(image));
+    }
+
+    #[test]
+    fn a_shrunk_image_has_the_means_of_squares() {
+        let large = Rgb {
+            width: 4,
+            height: 2,
+            pixels: (0..4 * 2).flat_map(|i| [i * 10, 0, 200]).collect(),
+        };
+        let small = large.shrunk(2);
+        // (0 + 10 + 40 + 50) / 4 and (20 + 30 + 60 + 70) / 4.
+        assert_eq!(small.pixels, [25, 0, 200, 45, 0, 200]);
+        assert_eq!((small.width, small.height), (2, 1));
+        assert_eq!(large.shrunk(1), large);
     }
 
     #[test]

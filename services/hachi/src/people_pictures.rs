@@ -4,10 +4,12 @@
 //! In: an image, tracks, where enrolled people are, masks. Out: RGB pixels, PNG files.
 
 mod canvas;
-mod font;
 
 use std::path::Path;
 
+use embedded_graphics::image::{Image, ImageRaw};
+use embedded_graphics::pixelcolor::{Rgb888, RgbColor as _};
+use embedded_graphics::prelude::{Drawable as _, Point};
 use hachi_bridge::AtomicFile;
 use hachi_inference::ImageView;
 use hachi_people::detect::Found;
@@ -16,7 +18,7 @@ use hachi_people::track::Track;
 
 use crate::exit::Failure;
 use crate::images::Rgb;
-use canvas::{Canvas, Color};
+use canvas::{blank, frame, label, tint};
 
 /// What is drawn into a picture.
 #[derive(Debug, Clone, Copy)]
@@ -32,24 +34,27 @@ pub struct Labels<'a> {
 }
 
 /// Colours of tracks, one after the other; neighbours in number are easily told apart.
-const TRACKS: [Color; 8] = [
-    [86, 180, 233],
-    [230, 159, 0],
-    [0, 158, 115],
-    [204, 121, 167],
-    [240, 228, 66],
-    [0, 114, 178],
-    [213, 94, 0],
-    [170, 170, 170],
+const TRACKS: [Rgb888; 8] = [
+    Rgb888::new(86, 180, 233),
+    Rgb888::new(230, 159, 0),
+    Rgb888::new(0, 158, 115),
+    Rgb888::new(204, 121, 167),
+    Rgb888::new(240, 228, 66),
+    Rgb888::new(0, 114, 178),
+    Rgb888::new(213, 94, 0),
+    Rgb888::new(170, 170, 170),
 ];
 /// Of enrolled people.
-const ENROLLED: Color = [255, 40, 40];
-const WHITE: Color = [255; 3];
+const ENROLLED: Rgb888 = Rgb888::new(255, 40, 40);
 
 /// The picture with everybody marked: those who are enrolled in red with their condition, the others by
 /// the numbers of their tracks.
 pub fn annotate(image: &ImageView<'_>, labels: &Labels<'_>) -> Rgb {
-    let mut canvas = Canvas::of(image);
+    let mut picture = Rgb {
+        width: image.width(),
+        height: image.height(),
+        pixels: image.rgb().to_vec(),
+    };
     let seen = labels
         .tracks
         .iter()
@@ -66,7 +71,9 @@ pub fn annotate(image: &ImageView<'_>, labels: &Labels<'_>) -> Rgb {
         };
         let found = track.detection.and_then(|index| labels.found.get(index));
         if let Some((found, mask)) = found.and_then(|found| Some((found, found.mask.as_ref()?))) {
-            canvas.tint(&found.bounding_box, color, |at| mask.covers(at));
+            tint(&mut picture, &found.bounding_box, color, |at| {
+                mask.covers(at)
+            });
         }
         later.push((track, person, color));
     }
@@ -74,15 +81,20 @@ pub fn annotate(image: &ImageView<'_>, labels: &Labels<'_>) -> Rgb {
     later.sort_by_key(|(_, person, _)| person.is_some());
     for (track, person, color) in later {
         let b = track.bounding_box();
-        canvas.frame(&b, color, if person.is_some() { 2 } else { 1 });
-        let label = match person {
+        frame(
+            &mut picture,
+            &b,
+            color,
+            if person.is_some() { 2 } else { 1 },
+        );
+        let text = match person {
             Some(status) => format!("P{} {}", status.person.0, status.condition.name()),
             None => track.id.to_string(),
         };
-        canvas.label([b.left, b.top], &label, color);
+        label(&mut picture, [b.left, b.top], &text, color);
     }
-    canvas.label([0.0, 0.0], labels.caption, WHITE);
-    canvas.done()
+    label(&mut picture, [0.0, 0.0], labels.caption, Rgb888::WHITE);
+    picture
 }
 
 /// Many pictures in one.
@@ -97,29 +109,6 @@ const GAP: usize = 4;
 /// The widest picture on a sheet.
 const MOST_COLUMNS: usize = 480;
 
-/// A picture of at most so many columns: each pixel the mean of a square.
-fn shrunk(picture: &Rgb, most_columns: usize) -> Rgb {
-    let by = picture.width.div_ceil(most_columns).max(1);
-    let (width, height) = (picture.width / by, picture.height / by);
-    let mut pixels = Vec::with_capacity(3 * width * height);
-    for place in 0..width * height {
-        let (left, top) = (place % width * by, place / width * by);
-        for channel in 0..3 {
-            let rows = top..top + by;
-            let square = rows.flat_map(|y| (left..left + by).map(move |x| (x, y)));
-            let values = square.map(|(x, y)| 3 * (y * picture.width + x) + channel);
-            let sum: usize = values.map(|at| usize::from(picture.pixels[at])).sum();
-            // The mean of bytes is one.
-            pixels.push((sum / (by * by)) as u8);
-        }
-    }
-    Rgb {
-        width,
-        height,
-        pixels,
-    }
-}
-
 impl ContactSheet {
     /// An empty one with so many pictures in a row.
     pub fn new(columns: usize) -> Self {
@@ -131,7 +120,8 @@ impl ContactSheet {
 
     /// Adds a picture; one that is wider than others are is made smaller.
     pub fn push(&mut self, picture: &Rgb) {
-        self.pictures.push(shrunk(picture, MOST_COLUMNS));
+        let by = picture.width.div_ceil(MOST_COLUMNS);
+        self.pictures.push(picture.shrunk(by));
     }
 
     /// All of them, row by row, each in a cell as large as the largest.
@@ -141,15 +131,16 @@ impl ContactSheet {
         let columns = self.columns.min(self.pictures.len()).max(1);
         let rows = self.pictures.len().div_ceil(columns).max(1);
         let size = [columns * (width + GAP) - GAP, rows * (height + GAP) - GAP];
-        let mut sheet = Canvas::blank(size, WHITE);
+        let mut sheet = blank(size, Rgb888::WHITE);
         for (index, picture) in self.pictures.iter().enumerate() {
-            let at = [
-                index % columns * (width + GAP),
-                index / columns * (height + GAP),
-            ];
-            sheet.paste(picture, at);
+            let at = Point::new(
+                (index % columns * (width + GAP)) as i32,
+                (index / columns * (height + GAP)) as i32,
+            );
+            let raw = ImageRaw::<Rgb888>::new(&picture.pixels, picture.width as u32);
+            let Ok(()) = Image::new(&raw, at).draw(&mut sheet);
         }
-        sheet.done()
+        sheet
     }
 
     /// Writes all of them to a PNG file.
@@ -182,9 +173,14 @@ mod tests {
     use hachi_people::identify::{AppearanceModel, Identifier, IdentifierConfig};
     use hachi_people::track::{Detection, Frame, Tracker, TrackerConfig};
 
-    fn pixel(picture: &Rgb, x: usize, y: usize) -> [u8; 3] {
+    fn pixel(picture: &Rgb, x: usize, y: usize) -> Rgb888 {
         let at = 3 * (y * picture.width + x);
-        picture.pixels[at..at + 3].try_into().unwrap()
+        let [red, green, blue] = picture.pixels[at..at + 3].try_into().unwrap();
+        Rgb888::new(red, green, blue)
+    }
+
+    const fn grey(shade: u8) -> Rgb888 {
+        Rgb888::new(shade, shade, shade)
     }
 
     #[test]
@@ -207,8 +203,8 @@ mod tests {
         identifier.enrol(model, Some(tracks[1].id));
         identifier.step(tracks, None, 0.1);
         let statuses: Vec<_> = identifier.statuses().copied().collect();
-        let grey = vec![100; 3 * 100 * 100];
-        let image = ImageView::new(100, 100, &grey).unwrap();
+        let wall = blank([100, 100], grey(100));
+        let image = wall.view().unwrap();
         let picture = annotate(
             &image,
             &Labels {
@@ -221,8 +217,8 @@ mod tests {
         // The lower left corners of both boxes, a place between them, a place inside.
         assert_eq!(pixel(&picture, 20, 79), TRACKS[tracks[0].id as usize]);
         assert_eq!(pixel(&picture, 60, 79), ENROLLED);
-        assert_eq!(pixel(&picture, 50, 79), [100; 3]);
-        assert_eq!(pixel(&picture, 30, 60), [100; 3]);
+        assert_eq!(pixel(&picture, 50, 79), grey(100));
+        assert_eq!(pixel(&picture, 30, 60), grey(100));
     }
 
     #[test]
@@ -237,10 +233,10 @@ mod tests {
         }
         let picture = sheet.picture();
         assert_eq!((picture.width, picture.height), (8 + GAP, 4 + GAP));
-        assert_eq!(pixel(&picture, 0, 0), [10; 3]);
-        assert_eq!(pixel(&picture, 4 + GAP, 1), [20; 3]);
-        assert_eq!(pixel(&picture, 3, 2 + GAP), [30; 3]);
-        assert_eq!(pixel(&picture, 4 + GAP, 2 + GAP), WHITE);
+        assert_eq!(pixel(&picture, 0, 0), grey(10));
+        assert_eq!(pixel(&picture, 4 + GAP, 1), grey(20));
+        assert_eq!(pixel(&picture, 3, 2 + GAP), grey(30));
+        assert_eq!(pixel(&picture, 4 + GAP, 2 + GAP), Rgb888::WHITE);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sheet.png");
         sheet.write(&path).unwrap();
@@ -248,18 +244,40 @@ mod tests {
     }
 
     #[test]
-    fn a_large_picture_is_made_smaller_by_means() {
-        let pixels = (0..4 * 2).flat_map(|i| [i * 10, 0, 200]).collect();
-        let small = shrunk(
-            &Rgb {
-                width: 4,
-                height: 2,
-                pixels,
-            },
-            2,
+    fn a_large_picture_is_made_smaller_on_a_sheet() {
+        let wide = MOST_COLUMNS + 2;
+        let mut sheet = ContactSheet::new(1);
+        sheet.push(&Rgb {
+            width: wide,
+            height: 2,
+            pixels: (0..2 * wide)
+                .flat_map(|at| [(at % 2 * 10) as u8, 0, 200])
+                .collect(),
+        });
+        let picture = sheet.picture();
+        assert_eq!((picture.width, picture.height), (wide / 2, 1));
+        assert_eq!(picture.pixels, [5, 0, 200].repeat(wide / 2));
+    }
+
+    #[test]
+    fn a_label_stays_in_the_picture_and_lies_above_its_place() {
+        let mut picture = blank([60, 40], grey(100));
+        label(&mut picture, [50.0, 30.0], "12", Rgb888::WHITE);
+        let changed: Vec<_> = (0..60 * 40)
+            .map(|at| (at % 60, at / 60))
+            .filter(|&(x, y)| pixel(&picture, x, y) != grey(100))
+            .collect();
+        // Two letters of 6 by 10 pixels.
+        let bounds = |of: fn(&(usize, usize)) -> usize| {
+            let places = changed.iter().map(of);
+            (places.clone().min().unwrap(), places.max().unwrap())
+        };
+        assert_eq!(bounds(|at| at.0), (48, 59));
+        assert_eq!(bounds(|at| at.1), (20, 29));
+        assert!(
+            changed
+                .iter()
+                .any(|&(x, y)| pixel(&picture, x, y) == Rgb888::WHITE)
         );
-        // (0 + 10 + 40 + 50) / 4 and (20 + 30 + 60 + 70) / 4.
-        assert_eq!(small.pixels, [25, 0, 200, 45, 0, 200]);
-        assert_eq!((small.width, small.height), (2, 1));
     }
 }

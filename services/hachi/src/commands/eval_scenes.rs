@@ -333,7 +333,7 @@ impl SceneRun {
                     tracks,
                     statuses: &statuses,
                     found: self.observer.found(),
-                    caption: &format!("{at_s:.1} S"),
+                    caption: &format!("{at_s:.1} s"),
                 };
                 sheet.push(&annotate(&image, &labels));
             }

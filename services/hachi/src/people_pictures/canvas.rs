@@ -1,139 +1,119 @@
-//! Pixels to draw on. What lies outside is not drawn.
+//! Drawing into a picture. Letters, frames and pictures in pictures are `embedded-graphics`', for
+//! which [`Rgb`] is a display; tinting what a mask covers, which it lacks, is here. What lies outside
+//! the picture is not drawn.
 
-use hachi_inference::ImageView;
+use std::convert::Infallible;
+
+use embedded_graphics::mono_font::ascii::{FONT_6X10, FONT_9X15, FONT_10X20};
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyleBuilder};
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::*;
+use embedded_graphics::primitives::{PrimitiveStyleBuilder, Rectangle, StrokeAlignment};
+use embedded_graphics::text::{Baseline, Text};
 use hachi_people::BoundingBox;
 
-use super::font;
 use crate::images::Rgb;
-
-/// Red, green, blue.
-pub(super) type Color = [u8; 3];
 
 /// How much of a tint covers what is below it.
 const TINT: f32 = 0.45;
-/// Pixels of a letter's dot.
-const DOT: usize = 2;
+/// What letters stand on.
+const GROUND: Rgb888 = Rgb888::new(20, 20, 20);
 
-pub(super) struct Canvas(Rgb);
-
-impl Canvas {
-    pub fn of(image: &ImageView<'_>) -> Self {
-        Self(Rgb {
-            width: image.width(),
-            height: image.height(),
-            pixels: image.rgb().to_vec(),
-        })
+/// Letters that are read and hide little in a picture of so many rows.
+const fn font(rows: usize) -> &'static MonoFont<'static> {
+    match rows {
+        ..480 => &FONT_6X10,
+        480..960 => &FONT_9X15,
+        _ => &FONT_10X20,
     }
+}
 
-    pub fn blank([width, height]: [usize; 2], color: Color) -> Self {
-        Self(Rgb {
-            width,
-            height,
-            pixels: color.repeat(width * height),
-        })
+impl OriginDimensions for Rgb {
+    fn size(&self) -> Size {
+        Size::new(self.width as u32, self.height as u32)
     }
+}
 
-    pub fn done(self) -> Rgb {
-        self.0
-    }
+impl DrawTarget for Rgb {
+    type Color = Rgb888;
+    type Error = Infallible;
 
-    fn pixel(&mut self, x: usize, y: usize) -> Option<&mut [u8]> {
-        let Rgb { width, height, .. } = self.0;
-        let at = 3 * (y * width + x);
-        (x < width && y < height).then(|| &mut self.0.pixels[at..at + 3])
-    }
-
-    fn set(&mut self, x: usize, y: usize, color: Color) {
-        if let Some(pixel) = self.pixel(x, y) {
-            pixel.copy_from_slice(&color);
-        }
-    }
-
-    /// Tints what a mask covers within a box.
-    pub fn tint(&mut self, b: &BoundingBox, color: Color, covers: impl Fn([f64; 2]) -> bool) {
-        let [columns, rows] = self.pixels_of(b);
-        for y in rows {
-            for x in columns.clone() {
-                if !covers([x as f64 + 0.5, y as f64 + 0.5]) {
-                    continue;
-                }
-                if let Some(pixel) = self.pixel(x, y) {
-                    for (channel, tint) in pixel.iter_mut().zip(color) {
-                        let mixed = f32::from(*channel) * (1.0 - TINT) + f32::from(tint) * TINT;
-                        *channel = mixed as u8;
-                    }
-                }
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(
+        &mut self,
+        pixels: I,
+    ) -> Result<(), Infallible> {
+        for Pixel(at, color) in pixels {
+            if let Some(pixel) = pixel(self, at) {
+                pixel.copy_from_slice(&[color.r(), color.g(), color.b()]);
             }
         }
+        Ok(())
     }
+}
 
-    /// The edge of a box, so many pixels wide, inside it.
-    pub fn frame(&mut self, b: &BoundingBox, color: Color, wide: usize) {
-        let [columns, rows] = self.pixels_of(b);
-        for y in rows.clone() {
-            for x in columns.clone() {
-                let near = |at: usize, range: &std::ops::Range<usize>| {
-                    at < range.start + wide || at + wide >= range.end
-                };
-                if near(x, &columns) || near(y, &rows) {
-                    self.set(x, y, color);
-                }
-            }
-        }
-    }
+fn pixel(picture: &mut Rgb, at: Point) -> Option<&mut [u8]> {
+    let x = usize::try_from(at.x).ok().filter(|&x| x < picture.width)?;
+    let y = usize::try_from(at.y).ok().filter(|&y| y < picture.height)?;
+    picture.pixels[3 * (y * picture.width + x)..].get_mut(..3)
+}
 
-    /// A word above a place, on dark ground.
-    pub fn label(&mut self, [left, top]: [f64; 2], text: &str, color: Color) {
-        if text.is_empty() {
-            return;
-        }
-        let [columns, rows] = font::SIZE;
-        let size = [
-            (text.chars().count() * (columns + 1) + 1) * DOT,
-            (rows + 2) * DOT,
-        ];
-        let room = [self.0.width, self.0.height];
-        let x = (left.max(0.0) as usize).min(room[0].saturating_sub(size[0]));
-        let y = (top.max(0.0) as usize).saturating_sub(size[1]);
-        for row in 0..size[1] {
-            for column in 0..size[0] {
-                self.set(x + column, y + row, [20; 3]);
-            }
-        }
-        for (index, letter) in text.chars().enumerate() {
-            let dots = font::dots(letter);
-            let begin = x + (index * (columns + 1) + 1) * DOT;
-            for row in 0..rows * DOT {
-                for column in 0..columns * DOT {
-                    if font::is_set(dots, column / DOT, row / DOT) {
-                        self.set(begin + column, y + DOT + row, color);
-                    }
-                }
-            }
-        }
+pub(super) fn blank([width, height]: [usize; 2], color: Rgb888) -> Rgb {
+    Rgb {
+        width,
+        height,
+        pixels: [color.r(), color.g(), color.b()].repeat(width * height),
     }
+}
 
-    /// Another picture, its upper left corner at a place.
-    pub fn paste(&mut self, picture: &Rgb, [left, top]: [usize; 2]) {
-        for y in 0..picture.height {
-            for x in 0..picture.width {
-                let at = 3 * (y * picture.width + x);
-                let color = [0, 1, 2].map(|channel| picture.pixels[at + channel]);
-                self.set(left + x, top + y, color);
-            }
+/// Tints what a mask covers within a box.
+pub(super) fn tint(
+    picture: &mut Rgb,
+    b: &BoundingBox,
+    color: Rgb888,
+    covers: impl Fn([f64; 2]) -> bool,
+) {
+    let tint = [color.r(), color.g(), color.b()];
+    let within = area(picture, b).points();
+    for at in within.filter(|at| covers([at.x, at.y].map(|v| f64::from(v) + 0.5))) {
+        for (channel, tint) in pixel(picture, at).into_iter().flatten().zip(tint) {
+            *channel = (f32::from(*channel) * (1.0 - TINT) + f32::from(tint) * TINT) as u8;
         }
     }
+}
 
-    /// The pixels of a box that lie in the picture.
-    fn pixels_of(&self, b: &BoundingBox) -> [std::ops::Range<usize>; 2] {
-        // The conversions saturate.
-        let span = |from: f64, to: f64, most: usize| {
-            let first = (from.round().max(0.0) as usize).min(most);
-            first..(to.round().max(0.0) as usize).clamp(first, most)
-        };
-        [
-            span(b.left, b.right(), self.0.width),
-            span(b.top, b.bottom(), self.0.height),
-        ]
-    }
+/// The edge of a box, so many pixels wide, inside it.
+pub(super) fn frame(picture: &mut Rgb, b: &BoundingBox, color: Rgb888, wide: u32) {
+    let style = PrimitiveStyleBuilder::new()
+        .stroke_color(color)
+        .stroke_width(wide)
+        .stroke_alignment(StrokeAlignment::Inside)
+        .build();
+    let Ok(()) = area(picture, b).into_styled(style).draw(picture);
+}
+
+/// A word above a place, on dark ground.
+pub(super) fn label(picture: &mut Rgb, [left, top]: [f64; 2], text: &str, color: Rgb888) {
+    let style = MonoTextStyleBuilder::new()
+        .font(font(picture.height))
+        .text_color(color)
+        .background_color(GROUND)
+        .build();
+    let text = Text::with_baseline(text, Point::zero(), style, Baseline::Top);
+    let room = picture.size().saturating_sub(text.bounding_box().size);
+    // Casts saturate.
+    let x = (left as i32).clamp(0, room.width as i32);
+    let y = (top as i32)
+        .saturating_sub_unsigned(text.bounding_box().size.height)
+        .max(0);
+    let Ok(_) = text.translate(Point::new(x, y)).draw(picture);
+}
+
+/// The pixels of a box that lie in the picture.
+fn area(picture: &Rgb, b: &BoundingBox) -> Rectangle {
+    // What is no number is nought.
+    let within = |edge: f64, most: usize| edge.round().clamp(0.0, most as f64) as u32;
+    let [left, right] = [b.left, b.right()].map(|x| within(x, picture.width));
+    let [top, bottom] = [b.top, b.bottom()].map(|y| within(y, picture.height));
+    let size = Size::new(right.saturating_sub(left), bottom.saturating_sub(top));
+    Rectangle::new(Point::new(left as i32, top as i32), size)
 }

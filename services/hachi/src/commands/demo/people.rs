@@ -182,7 +182,7 @@ impl Album {
             tracks: watch.tracks(),
             statuses: &statuses,
             found: &looked.found,
-            caption: &format!("{at_s:.1} S"),
+            caption: &format!("{at_s:.1} s"),
         };
         let sheet = self.sheet.get_or_insert_with(|| ContactSheet::new(COLUMNS));
         sheet.push(&annotate(&image, &labels));

@@ -128,7 +128,7 @@ fn files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 /// A crop as it is kept.
 fn kept(mut crop: Rgb) -> Result<Vec<u8>, String> {
     while crop.height.max(crop.width) > MOST_HIGH && crop.height.min(crop.width) > 1 {
-        crop = crop.halved();
+        crop = crop.shrunk(2);
     }
     crop.to_png().map_err(|error| error.to_string())
 }
