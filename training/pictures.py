@@ -11,8 +11,9 @@ import numpy as np
 
 WIDTH, HEIGHT = 640, 360
 
-# A person in a frame; `label` is the person's number in that frame's mask.
-Seen = namedtuple("Seen", "frame label id box visible whole distance_m bearing_deg")
+# A person in a frame; `camera` is unique over all buildings, `label` is the person's number in that
+# frame's mask.
+Seen = namedtuple("Seen", "frame camera label id box visible whole distance_m bearing_deg")
 
 
 def rgb(yuyv):
@@ -34,6 +35,7 @@ class Pictures:
             self.people = [
                 Seen(
                     int(row["frame"]),
+                    int(row["camera"]),
                     int(row["person"]),
                     int(row["id"]),
                     tuple(int(row[side]) for side in ("left", "top", "right", "bottom")),

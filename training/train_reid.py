@@ -50,7 +50,7 @@ def scenes(folder):
         if seen.visible < LEAST_SHARE * seen.whole:
             continue
         mask = pictures.masks[seen.frame] == seen.label
-        yield seen.id, seen.frame % 36 // 12, pictures.image(seen.frame), mask, seen.box
+        yield seen.id, seen.camera, pictures.image(seen.frame), mask, seen.box
 
 
 def alone(folder):

@@ -6,8 +6,8 @@
 //!
 //! Found is who has a box of the same person with an overlap of half; average precision as in
 //! Pascal VOC 2010 (all points). People seen on less than 96 pixels or lower than 16 are neither
-//! asked for nor missed. Ranking: each person found is searched for among those that the
-//! building's other cameras found, in all buildings.
+//! asked for nor missed. Ranking: each person found is searched for among those that other cameras
+//! found, in all buildings.
 #![allow(clippy::print_stdout, reason = "an example prints its result")]
 
 use std::error::Error;
@@ -20,13 +20,12 @@ use hachi_inference::{ImageView, LoadOptions, load};
 use hachi_people::BoundingBox;
 use hachi_people::appearance::{Appearance, Person};
 use hachi_people::detect::{Detector, Found, Wanted};
+use hachi_people::gallery;
 use hachi_realsense::frame::{Layout, YuyvImage};
+use hachi_tests::masks::mask_overlap;
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 360;
-/// Pictures of a building, and of each of its cameras.
-const BUILDING: usize = 36;
-const CAMERA: usize = 12;
 const LEAST_PIXELS: usize = 96;
 const LEAST_HEIGHT: f64 = 16.0;
 /// Less seen than this, pixels and share, somebody is not told apart.
@@ -35,6 +34,7 @@ const OVERLAP: f64 = 0.5;
 
 /// A person in a picture.
 struct Truth {
+    camera: u32,
     label: u8,
     id: u32,
     bounding_box: BoundingBox,
@@ -51,7 +51,7 @@ impl Truth {
 /// Somebody found who can be told apart.
 struct Seen {
     id: u32,
-    camera: usize,
+    camera: u32,
     feature: Vec<f32>,
 }
 
@@ -94,14 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         YuyvImage::new(&yuyv, layout)?.to_rgb(&mut rgb)?;
         let image = ImageView::new(WIDTH as usize, HEIGHT as usize, &rgb)?;
         let people = truth.get(frames).map_or(&[][..], Vec::as_slice);
-        let camera = frames % BUILDING / CAMERA;
-        figures.look(
-            &mut detector,
-            &mut appearance,
-            &image,
-            (people, &mask),
-            camera,
-        )?;
+        figures.look(&mut detector, &mut appearance, &image, (people, &mask))?;
         frames += 1;
     }
     figures.print(
@@ -119,6 +112,7 @@ fn read_truth(path: &Path) -> Result<Vec<Vec<Truth>>, Box<dyn Error>> {
         let row = row.collect::<Result<Vec<_>, _>>()?;
         let [
             frame,
+            camera,
             label,
             id,
             left,
@@ -127,16 +121,18 @@ fn read_truth(path: &Path) -> Result<Vec<Vec<Truth>>, Box<dyn Error>> {
             bottom,
             visible,
             whole,
-            ..,
+            _distance_m,
+            _bearing_deg,
         ] = row[..]
         else {
             return Err(format!("{}: {line}", path.display()).into());
         };
         frames.resize_with(frames.len().max(frame as usize + 1), Vec::new);
         frames[frame as usize].push(Truth {
+            camera: camera as u32,
             label: label as u8,
             id: id as u32,
-            bounding_box: BoundingBox::new(left, top, right - left, bottom - top),
+            bounding_box: BoundingBox::of_edges([left, top, right, bottom]),
             pixels: visible as usize,
             share: visible / whole,
         });
@@ -151,7 +147,6 @@ impl Figures {
         appearance: &mut Appearance,
         image: &ImageView<'_>,
         (people, mask): (&[Truth], &[u8]),
-        camera: usize,
     ) -> Result<(), Box<dyn Error>> {
         let begun = Instant::now();
         let found = detector.detect(image)?.to_vec();
@@ -175,7 +170,9 @@ impl Figures {
                 None => self.detections.push((found.score, false)),
             }
         }
-        let overlap = |(found, truth): &(&Found, &Truth)| mask_overlap(found, truth.label, mask);
+        let overlap = |(found, truth): &(&Found, &Truth)| {
+            mask_overlap(found, truth.label, mask, WIDTH as usize)
+        };
         self.masks.extend(matched.iter().filter_map(overlap));
         matched
             .retain(|(_, truth)| truth.pixels >= LEAST_TO_TELL.0 && truth.share >= LEAST_TO_TELL.1);
@@ -187,7 +184,7 @@ impl Figures {
         for ((_, truth), feature) in matched.iter().zip(features) {
             self.seen.push(Seen {
                 id: truth.id,
-                camera,
+                camera: truth.camera,
                 feature: feature.to_vec(),
             });
         }
@@ -251,22 +248,6 @@ fn crop(found: &Found) -> Person<'_> {
     }
 }
 
-/// Intersection over union of a mask and the true one.
-fn mask_overlap(found: &Found, label: u8, truth: &[u8]) -> Option<f64> {
-    let mask = found.mask.as_ref()?;
-    let b = &found.bounding_box;
-    let (mut both, mut either) = (0, 0);
-    for (index, true_label) in truth.iter().enumerate() {
-        let (x, y) = (index % WIDTH as usize, index / WIDTH as usize);
-        let at = [x as f64 + 0.5, y as f64 + 0.5];
-        let inside = (b.left..b.right()).contains(&at[0]) && (b.top..b.bottom()).contains(&at[1]);
-        let (covers, is_true) = (inside && mask.covers(at), *true_label == label);
-        both += usize::from(covers && is_true);
-        either += usize::from(covers || is_true);
-    }
-    Some(both as f64 / f64::from(either.max(1) as u32))
-}
-
 /// Area under precision over recall, precision never below that at greater recall.
 fn average_precision(detections: &[(f64, bool)], people: usize) -> f64 {
     let mut curve = Vec::new();
@@ -295,10 +276,6 @@ fn operating_points(detections: &[(f64, bool)], people: usize) -> Vec<(f64, f64,
     [0.2, 0.3, 0.4, 0.5, 0.6, 0.7].map(at).to_vec()
 }
 
-fn cosine_distance(a: &[f32], b: &[f32]) -> f64 {
-    1.0 - f64::from(a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>())
-}
-
 fn ranking(seen: &[Seen]) -> (f64, f64) {
     let (mut first, mut precisions) = (Vec::new(), Vec::new());
     for query in seen {
@@ -306,7 +283,7 @@ fn ranking(seen: &[Seen]) -> (f64, f64) {
         let mut others: Vec<_> = others
             .map(|other| {
                 (
-                    cosine_distance(&query.feature, &other.feature),
+                    gallery::distance(&query.feature, &other.feature),
                     other.id == query.id,
                 )
             })
@@ -331,7 +308,7 @@ fn distances(seen: &[Seen]) -> (Vec<f64>, Vec<f64>) {
     let (mut same, mut others) = (Vec::new(), Vec::new());
     for (index, a) in seen.iter().enumerate() {
         for b in &seen[index + 1..] {
-            let distance = cosine_distance(&a.feature, &b.feature);
+            let distance = gallery::distance(&a.feature, &b.feature);
             if a.id == b.id { &mut same } else { &mut others }.push(distance);
         }
     }

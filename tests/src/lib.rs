@@ -1,4 +1,7 @@
-//! What the end-to-end tests share: the simulated robot as scans, and errors against its truth.
+//! What the end-to-end tests share: the simulated robot as scans, and errors against its truth; masks
+//! of people against theirs.
+
+pub mod masks;
 
 use hachi_hal::{LidarScans, Point, Pose, ScanHeader, Stamp};
 use hachi_velodyne::{VelodyneConfig, VelodyneScans};

@@ -9,6 +9,7 @@ use hachi_people::appearance::{Appearance, Person as Seen};
 use hachi_people::detect::{Detector, Found, Wanted};
 use hachi_people::gallery;
 use hachi_realsense::frame::{Layout, YuyvImage};
+use hachi_tests::masks::{mask_overlap, middle_in};
 use hachi_world::{
     CameraConfig, CameraFrame, Light, Outfit, Person, Preset, SimulatedCamera, SimulationConfig,
     Visit,
@@ -117,9 +118,7 @@ fn well_seen(frame: &CameraFrame) -> Vec<(u8, u32, BoundingBox)> {
             truth.visible.is_some_and(|b| b.height() >= 100) && truth.visible_share() > 0.5
         })
         .filter_map(|(truth, label)| {
-            let b = truth.visible?;
-            let [left, top] = [b.left, b.top].map(f64::from);
-            let bounding_box = BoundingBox::new(left, top, b.width().into(), b.height().into());
+            let bounding_box = BoundingBox::of_edges(truth.visible?.edges());
             Some((label, truth.id, bounding_box))
         })
         .collect()
@@ -134,19 +133,6 @@ fn who_has<'a>(found: &'a [Found], bounding_box: &BoundingBox) -> Option<&'a Fou
     (overlap(best) >= 0.5).then_some(best)
 }
 
-fn mask_overlap(found: &Found, label: u8, truth: &[u8]) -> f64 {
-    let (mask, b) = (found.mask.as_ref().unwrap(), &found.bounding_box);
-    let (mut both, mut either) = (0, 0);
-    for (index, true_label) in truth.iter().enumerate() {
-        let at = [index % WIDTH as usize, index / WIDTH as usize].map(|p| p as f64 + 0.5);
-        let inside = (b.left..b.right()).contains(&at[0]) && (b.top..b.bottom()).contains(&at[1]);
-        let covers = inside && mask.covers(at);
-        both += u32::from(covers && *true_label == label);
-        either += u32::from(covers || *true_label == label);
-    }
-    f64::from(both) / f64::from(either)
-}
-
 #[test]
 fn people_are_found_where_they_truly_are() {
     let mut detector = detector();
@@ -156,7 +142,7 @@ fn people_are_found_where_they_truly_are() {
         for (label, id, truth) in well_seen(frame) {
             people += 1;
             if let Some(hit) = who_has(&found, &truth) {
-                let overlap = mask_overlap(hit, label, &frame.masks);
+                let overlap = mask_overlap(hit, label, &frame.masks, WIDTH as usize).unwrap();
                 assert!(overlap > 0.5, "{id} in {}: {overlap}", frame.sequence);
                 hits += 1;
             }
@@ -164,11 +150,8 @@ fn people_are_found_where_they_truly_are() {
         // Everybody who is called sure is somebody, whole or in parts.
         for found in &found {
             let b = &found.bounding_box;
-            let shown = frame.masks.iter().enumerate().filter(|(index, mask)| {
-                let at = [index % WIDTH as usize, index / WIDTH as usize].map(|p| p as f64 + 0.5);
-                let inside =
-                    (b.left..b.right()).contains(&at[0]) && (b.top..b.bottom()).contains(&at[1]);
-                inside && **mask > 0
+            let shown = frame.masks.iter().enumerate().filter(|(pixel, mask)| {
+                **mask > 0 && middle_in(b, *pixel, WIDTH as usize).is_some()
             });
             let share = shown.count() as f64 / (b.width * b.height);
             assert!(share > 0.15, "nobody at {b:?} in {}", frame.sequence);

@@ -5,7 +5,7 @@
 
 use hachi_people::BoundingBox;
 use hachi_people::followed::{Followed, Sight};
-use hachi_world::{PersonTruth, PixelBox};
+use hachi_world::PersonTruth;
 
 /// A person who is less tall in the picture is too far away to be asked for, pixels.
 const LEAST_HEIGHT: u32 = 32;
@@ -45,7 +45,7 @@ fn owner(bounding_box: &BoundingBox, people: &[PersonTruth]) -> Option<u32> {
     let overlap = |person: &PersonTruth| {
         person.visible?;
         let boxes = [person.visible, person.whole].into_iter().flatten();
-        let overlaps = boxes.map(|b| bounding_box.iou(&of_pixels(&b)));
+        let overlaps = boxes.map(|b| bounding_box.iou(&BoundingBox::of_edges(b.edges())));
         overlaps.max_by(f64::total_cmp)
     };
     let all = people
@@ -58,20 +58,15 @@ fn owner(bounding_box: &BoundingBox, people: &[PersonTruth]) -> Option<u32> {
 /// Where a user who means a person would point: the middle of what is seen of them.
 pub fn pointed_at(people: &[PersonTruth], who: u32) -> Option<[f64; 2]> {
     let person = people.iter().find(|person| person.id == who)?;
-    person.visible.map(|seen| of_pixels(&seen).middle())
-}
-
-/// A box of whole pixels, as detectors count.
-pub fn of_pixels(b: &PixelBox) -> BoundingBox {
-    let [left, top] = [b.left, b.top].map(f64::from);
-    BoundingBox::new(left, top, f64::from(b.width()), f64::from(b.height()))
+    let seen = person.visible?;
+    Some(BoundingBox::of_edges(seen.edges()).middle())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use hachi_world::scenes::Script;
-    use hachi_world::{CameraConfig, SimulatedCamera};
+    use hachi_world::{CameraConfig, PixelBox, SimulatedCamera};
 
     fn person(id: u32, left: u32, width: u32, visible: f64) -> PersonTruth {
         let scene = Script::Return.scene(1);

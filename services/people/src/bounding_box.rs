@@ -24,6 +24,11 @@ impl BoundingBox {
         }
     }
 
+    /// A box by its left, upper, right and lower edge, pixels.
+    pub const fn of_edges([left, top, right, bottom]: [f64; 4]) -> Self {
+        Self::new(left, top, right - left, bottom - top)
+    }
+
     /// A box by its middle and size, pixels.
     pub fn around(middle: [f64; 2], width: f64, height: f64) -> Self {
         Self::new(
@@ -52,6 +57,11 @@ impl BoundingBox {
     /// Square pixels; none for a box without width or height.
     pub fn area(&self) -> f64 {
         self.width.max(0.0) * self.height.max(0.0)
+    }
+
+    /// Whether a place lies in it; its left and upper edge belong to it, the others do not.
+    pub fn contains(&self, [x, y]: [f64; 2]) -> bool {
+        (self.left..self.right()).contains(&x) && (self.top..self.bottom()).contains(&y)
     }
 
     /// Whether it is finite and has a width and a height.
@@ -111,6 +121,14 @@ mod tests {
         let b = BoundingBox::new(1.0, 0.0, 2.0, 2.0);
         assert_eq!(a.iou(&b), 2.0 / 6.0);
         assert_eq!(a.iou(&a), 1.0);
+    }
+
+    #[test]
+    fn a_box_of_edges_ends_before_the_right_and_the_lower_one() {
+        let b = BoundingBox::of_edges([3.0, 10.0, 5.0, 14.0]);
+        assert_eq!(b, BoundingBox::new(3.0, 10.0, 2.0, 4.0));
+        assert!(b.contains([3.0, 10.0]) && b.contains([4.5, 13.5]));
+        assert!(!b.contains([5.0, 12.0]) && !b.contains([4.0, 14.0]) && !b.contains([2.5, 12.0]));
     }
 
     #[test]

@@ -196,7 +196,7 @@ impl Detector {
             let (left, top) = (left.max(0.0), top.max(0.0));
             let right = right.min(image.width() as f64);
             let bottom = bottom.min(image.height() as f64);
-            let bounding_box = BoundingBox::new(left, top, right - left, bottom - top);
+            let bounding_box = BoundingBox::of_edges([left, top, right, bottom]);
             if !bounding_box.is_sound() {
                 continue;
             }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `color.yuyv` | pictures of 640 x 360, YUYV, one after the other |
 //! | `masks.u8` | for each of their pixels whom it shows: 0 is nobody, then the people in the order of `people.csv` |
-//! | `people.csv` | `frame,person,id,left,top,right,bottom,visible,whole,distance_m,bearing_deg`: the box around the visible pixels, pixels seen, pixels if nothing were in the way, how far away, from where seen (0 is the face) |
+//! | `people.csv` | `frame,camera,person,id,left,top,right,bottom,visible,whole,distance_m,bearing_deg`: which camera (no two buildings share a number), the box around the visible pixels, pixels seen, pixels if nothing were in the way, how far away, from where seen (0 is the face) |
 
 use std::f64::consts::PI;
 use std::fs::File;
@@ -60,7 +60,8 @@ pub fn render(folder: &Path, first_seed: u64, buildings: u64) -> std::io::Result
         people: create("people.csv")?,
         frames: 0,
     };
-    let columns = "frame,person,id,left,top,right,bottom,visible,whole,distance_m,bearing_deg";
+    let columns =
+        "frame,camera,person,id,left,top,right,bottom,visible,whole,distance_m,bearing_deg";
     writeln!(files.people, "{columns}")?;
     for seed in first_seed..first_seed + buildings {
         render_building(seed, &mut files)?;
@@ -98,16 +99,17 @@ fn render_building(seed: u64, files: &mut Files) -> std::io::Result<()> {
     simulation.people = people.into();
     for (number, mount) in mounts.iter().enumerate() {
         let mut camera = SimulatedCamera::new(&simulation, camera(mount, &mut random));
+        let camera_id = seed * CAMERAS as u64 + number as u64;
         for shot in (number..CAMERAS * SHOTS_EACH).step_by(CAMERAS) {
             let time_ns = (SHOT_S * (shot + 1) as f64 * 1e9) as i64;
             camera.skip_to(simulation.start + time_ns);
-            write(&mut camera, files)?;
+            write(camera_id, &mut camera, files)?;
         }
     }
     Ok(())
 }
 
-fn write(camera: &mut SimulatedCamera, files: &mut Files) -> std::io::Result<()> {
+fn write(camera_id: u64, camera: &mut SimulatedCamera, files: &mut Files) -> std::io::Result<()> {
     let stamp = camera.next_stamp();
     let map_from_depth = camera.map_from_depth(stamp.unwrap_or(Stamp::from_nanos(0)));
     let Some(frame) = camera.next_color_frame() else {
@@ -121,7 +123,7 @@ fn write(camera: &mut SimulatedCamera, files: &mut Files) -> std::io::Result<()>
         let eye = truth.map_from_person.inverse_transform_point(&eye);
         writeln!(
             files.people,
-            "{},{},{},{},{},{},{},{},{},{:.3},{:.1}",
+            "{},{camera_id},{},{},{},{},{},{},{},{},{:.3},{:.1}",
             files.frames,
             number + 1,
             truth.id,

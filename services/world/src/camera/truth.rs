@@ -40,6 +40,11 @@ impl PixelBox {
         )
     }
 
+    /// Left, upper, right and lower edge, in pixels from the picture's corner.
+    pub fn edges(&self) -> [f64; 4] {
+        [self.left, self.top, self.right, self.bottom].map(f64::from)
+    }
+
     /// Columns.
     pub const fn width(&self) -> u32 {
         self.right - self.left
