@@ -43,8 +43,7 @@ impl PacketSource for Recorded {
     }
 }
 
-#[test]
-fn from_packet_to_pose_nothing_is_allocated_once_warm() {
+fn main() {
     let mut simulation = Simulation::new(SimulationConfig::preset(Preset::Office, 1, 12.0));
     let mut packets = Vec::new();
     while let Some(packet) = simulation.next_packet() {

@@ -46,8 +46,7 @@ fn acts() -> Vec<Act> {
     acts
 }
 
-#[test]
-fn a_streaming_camera_allocates_nothing() {
+fn main() {
     let simulated = Camera::new(acts());
     let log = simulated.log();
     let plugged = Plugged::once(simulated);

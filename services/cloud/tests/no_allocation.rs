@@ -17,9 +17,7 @@ fn allocations() -> usize {
     stats.allocations + stats.reallocations
 }
 
-/// One test alone in its file: another thread's allocations would count.
-#[test]
-fn warm_filters_allocate_nothing_in_any_mode() {
+fn main() {
     let mut scene = Scene::default();
     scene
         .slab([-10.0, -1.2], [10.0, 1.2], 0.0, Finish::Solid(4.0))

@@ -29,8 +29,7 @@ fn allocations() -> usize {
 const WARM_S: i64 = 28;
 const COUNTED_S: i64 = 4;
 
-#[test]
-fn the_tasks_of_a_walking_robot_allocate_nothing_once_warm() {
+fn main() {
     let platform = Platform::of_name("b1").unwrap();
     let mut settings = Settings::load(Some("b1"), None).unwrap();
     settings.motion = MotionInput::Odometry;

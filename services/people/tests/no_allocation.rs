@@ -49,8 +49,7 @@ fn people_at(frame: usize, detections: &mut Vec<Detection>, features: &mut Vec<f
     }
 }
 
-#[test]
-fn twenty_people_cost_no_memory_once_warm() {
+fn main() {
     let mut tracker = Tracker::new(TrackerConfig::default());
     let mut identifier = Identifier::new(IdentifierConfig::default());
     let (mut detections, mut features) = (Vec::new(), Vec::new());
