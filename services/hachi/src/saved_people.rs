@@ -34,11 +34,7 @@ pub fn paths(arguments: &StoreArguments) -> Result<PeoplePaths, Failure> {
             format_args!("name a file with --store or {VARIABLE}"),
         )
     })?;
-    let mut paths = PeoplePaths::beside(&file);
-    if let Some(key) = &arguments.key {
-        paths.key.clone_from(key);
-    }
-    Ok(paths)
+    Ok(PeoplePaths::with_key(&file, arguments.key.as_deref()))
 }
 
 /// Opens the store, and makes it if there is none.

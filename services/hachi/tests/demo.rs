@@ -30,7 +30,7 @@ fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
     // A map that begins here is trusted from its first scan on.
     assert_eq!(report["map_conditions"]["ok"], report["conditions"]["ok"]);
 
-    // Its person is in view and followed all the while, and nobody else is.
+    // Its person is in view and followed until they go into a room, and nobody else is.
     let people = &report["people"];
     assert!(
         (19..=20).contains(&people["pictures"].as_u64().unwrap()),
@@ -66,6 +66,22 @@ fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
         (here.as_f64().unwrap() - there.as_f64().unwrap()).abs() < 1e-6,
         "{here} {there}"
     );
+}
+
+/// The robot's person goes into a room while somebody else walks ahead, and comes out again.
+#[test]
+fn the_robots_person_leaves_and_is_known_again_in_the_demo() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("demo");
+    let run = run(&["demo", "--seconds", "25", "--headless", "--out", text(&out)]);
+    let person = &whole_results(&out)["people"]["person"];
+    let number = |name: &str| person[name].as_f64().unwrap();
+    assert_eq!(number("re_identifications_needed"), 1.0, "{person}");
+    assert_eq!(number("re_identified"), 1.0, "{person}");
+    assert!(number("re_identified_after_s") < 4.0, "{person}");
+    assert_eq!(number("wrong_s"), 0.0, "{person}");
+    let told = run.success();
+    assert!(told.contains("known again 1 of 1 times, after "), "{told}");
 }
 
 #[test]

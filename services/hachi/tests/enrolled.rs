@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use hachi_people::identify::AppearanceModel;
 use hachi_store::people::{NetworkIdentity, NewPerson, PeopleFile, PeoplePaths};
-use hachi_world::{CameraConfig, Outfit, Person, Preset, SimulatedCamera, SimulationConfig, Visit};
+use program::scenes::{frames_of, somebody};
 use program::{Run, finished, hachi, names, recording, text};
 
 /// `hachi people` with temporary files in a folder that the test looks into.
@@ -189,59 +189,12 @@ fn frames_with_more_than_one_person_are_no_pictures_of_anybody() {
     );
 }
 
-/// Frames of the simulated camera with one person who walks away from the robot, as PNG files.
-fn simulated_frames(folder: &Path) {
-    let person = Person {
-        id: 1,
-        height_m: 1.75,
-        skin: [220, 180, 150],
-        hair: [60, 40, 30],
-        visits: vec![Visit {
-            begins_s: 0.0,
-            path: vec![[2.5, 0.5], [6.5, 0.2]],
-            speed_m_s: 0.6,
-            stays_s: 60.0,
-            outfit: Outfit {
-                top: [190, 40, 40],
-                trousers: [50, 60, 110],
-                shoes: [30, 30, 30],
-            },
-        }],
-    };
-    let simulation = SimulationConfig {
-        people: [person].into(),
-        ..SimulationConfig::preset(Preset::Office, 1, 20.0)
-    };
-    let mut camera = SimulatedCamera::new(&simulation, CameraConfig::d455(640, 360, 0.2));
-    for number in 0..14 {
-        camera.skip_to(simulation.start + 3_000_000_000 + number * 200_000_000);
-        let frame = camera.next_frame().unwrap();
-        let mut pixels = Vec::new();
-        for pair in frame.color.chunks_exact(4) {
-            let (u, v) = (f64::from(pair[1]) - 128.0, f64::from(pair[3]) - 128.0);
-            for y in [pair[0], pair[2]] {
-                // ITU-R BT.601, studio range.
-                let y = 1.164 * (f64::from(y) - 16.0);
-                let rgb = [y + 1.596 * v, y - 0.392 * u - 0.813 * v, y + 2.017 * u];
-                pixels.extend(rgb.map(|c| c.clamp(0.0, 255.0) as u8));
-            }
-        }
-        let image = ::hachi::images::Rgb {
-            width: 640,
-            height: 360,
-            pixels,
-        };
-        let path = folder.join(format!("{number}.png"));
-        std::fs::write(path, image.to_png().unwrap()).unwrap();
-    }
-}
-
 #[test]
 fn a_person_in_front_of_the_simulated_robot_is_enrolled_with_nothing_installed() {
     let folder = tempfile::tempdir().unwrap();
     let frames = folder.path().join("frames");
     std::fs::create_dir(&frames).unwrap();
-    simulated_frames(&frames);
+    frames_of(&somebody(), &frames);
     let store = folder.path().join("people.db");
     let networks = ["--detector", "own:detector", "--reid", "own:reid"];
     let arguments = ["enrol", "Walker", text(&frames), "--json"];

@@ -112,6 +112,32 @@ fn nothing_of_a_forgotten_person_is_left_in_any_file() {
     store.model_of(&anna, &network("osnet")).unwrap();
 }
 
+/// A change that was killed before its key file took the old one's place leaves one beside it. The
+/// second name of that file shows what becomes of its bytes.
+#[test]
+fn keys_that_an_interrupted_change_left_are_overwritten() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = paths(folder.path());
+    let (mut store, berta, hidden) = with_berta(&paths);
+    let (left_over, second) = (
+        folder.path().join("people.key.new"),
+        folder.path().join("second name"),
+    );
+    std::fs::copy(&paths.key, &left_over).unwrap();
+    std::fs::hard_link(&left_over, &second).unwrap();
+    store.forget(&berta).unwrap();
+    assert!(!left_over.exists());
+    assert_eq!(left(folder.path(), &hidden), 0);
+
+    // Where a link lies in the way, what it leads to is somebody else's.
+    let other = folder.path().join("other");
+    std::fs::write(&other, "somebody else's").unwrap();
+    std::os::unix::fs::symlink(&other, &left_over).unwrap();
+    enrol(&mut store, "Clara", 3, 1).unwrap();
+    assert_eq!(std::fs::read(&other).unwrap(), b"somebody else's");
+    assert!(!left_over.exists() && !paths.key.is_symlink());
+}
+
 #[test]
 fn a_copy_of_the_store_from_before_says_nothing_after_it() {
     let folder = tempfile::tempdir().unwrap();

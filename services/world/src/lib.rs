@@ -32,6 +32,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod actor;
 mod aim;
 mod building;
 mod calendar;

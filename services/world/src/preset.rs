@@ -74,16 +74,16 @@ impl Preset {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }
 
-    /// Who walks about in the world of a seed: in the office the robot's person, who walks ahead of
-    /// it, and three who come towards it; nobody elsewhere.
+    /// Who walks about in the world of a seed. In the office: first the robot's person, who walks ahead
+    /// of it and looks into rooms on the way, then somebody who goes the same way further ahead, and two
+    /// who come towards it. Nobody elsewhere.
     pub fn people(self, seed: u64) -> Vec<Person> {
         if self != Self::Office {
             return Vec::new();
         }
-        let robot = self.world(seed).trajectory;
         let mut cast = Cast::new(generator(seed, Purpose::People, u64::MAX));
         let mut random = generator(seed, Purpose::Scene, 0);
-        office_people(&mut random, &robot, &mut cast)
+        office_people(&mut random, Gait::quadruped(), &mut cast)
     }
 
     /// The world of a seed; another seed gives another layout.

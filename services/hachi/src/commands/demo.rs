@@ -245,9 +245,11 @@ fn seen(people: &PeopleReport) -> String {
         tracks.join(", ")
     );
     if let Some(person) = &people.person {
+        let after = person.re_identified_after_s;
+        let after = after.map_or(String::new(), |after| format!(", after {after:.1} s"));
         text += &format!(
             "its person, P{}, is {}: followed for {:.1} of {:.1} s in view ({:.0} %), known again {} of \
-             {} times; somebody else followed for {:.1} s\n",
+             {} times{after}; somebody else followed for {:.1} s\n",
             person.id,
             person.condition,
             person.tracked_s,

@@ -64,10 +64,7 @@ fn watcher(config: &PeopleConfig) -> Option<Watcher> {
         }
     };
     let kept = config.store.as_deref().and_then(|store| {
-        let mut paths = PeoplePaths::beside(store);
-        if let Some(key) = &config.key {
-            paths.key.clone_from(key);
-        }
+        let paths = PeoplePaths::with_key(store, config.key.as_deref());
         let kept = kept(&paths, &chosen);
         kept.map_err(|failure| warn!("nobody is known: {failure}"))
             .ok()

@@ -1,9 +1,13 @@
-//! Recordings made here, with known truth: a room seen from a sensor that moves 10 cm a scan.
+//! Recordings made here, with known truth: a room seen from a sensor that moves 10 cm a scan, and
+//! frames of a person.
 
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use hachi_world::{Preset, Simulation, SimulationConfig, write_pcap};
+use hachi_world::{
+    CameraConfig, Outfit, Person, Preset, SimulatedCamera, Simulation, SimulationConfig, Visit,
+    write_pcap,
+};
 
 /// x, y, z, intensity.
 pub type Row = [f32; 4];
@@ -82,4 +86,55 @@ pub fn capture(folder: &Path, seconds: f64) -> PathBuf {
     let file = BufWriter::new(std::fs::File::create(&path).unwrap());
     write_pcap(&mut simulation, file).unwrap();
     path
+}
+
+/// Somebody in red and blue who walks away from the robot.
+pub fn somebody() -> Person {
+    Person {
+        id: 1,
+        height_m: 1.75,
+        skin: [220, 180, 150],
+        hair: [60, 40, 30],
+        visits: vec![Visit {
+            begins_s: 0.0,
+            path: vec![[2.5, 0.5], [6.5, 0.2]],
+            speed_m_s: 0.6,
+            stays_s: 60.0,
+            outfit: Outfit {
+                top: [190, 40, 40],
+                trousers: [50, 60, 110],
+                shoes: [30, 30, 30],
+            },
+        }],
+    }
+}
+
+/// Frames of the simulated camera with one person, as PNG files.
+pub fn frames_of(person: &Person, folder: &Path) {
+    let simulation = SimulationConfig {
+        people: [person.clone()].into(),
+        ..SimulationConfig::preset(Preset::Office, 1, 20.0)
+    };
+    let mut camera = SimulatedCamera::new(&simulation, CameraConfig::d455(640, 360, 0.2));
+    for number in 0..14 {
+        camera.skip_to(simulation.start + 3_000_000_000 + number * 200_000_000);
+        let frame = camera.next_frame().unwrap();
+        let mut pixels = Vec::new();
+        for pair in frame.color.chunks_exact(4) {
+            let (u, v) = (f64::from(pair[1]) - 128.0, f64::from(pair[3]) - 128.0);
+            for y in [pair[0], pair[2]] {
+                // ITU-R BT.601, studio range.
+                let y = 1.164 * (f64::from(y) - 16.0);
+                let rgb = [y + 1.596 * v, y - 0.392 * u - 0.813 * v, y + 2.017 * u];
+                pixels.extend(rgb.map(|c| c.clamp(0.0, 255.0) as u8));
+            }
+        }
+        let image = ::hachi::images::Rgb {
+            width: 640,
+            height: 360,
+            pixels,
+        };
+        let path = folder.join(format!("{number}.png"));
+        std::fs::write(path, image.to_png().unwrap()).unwrap();
+    }
 }

@@ -31,6 +31,15 @@ impl PeoplePaths {
             key: file.with_extension("key"),
         }
     }
+
+    /// A store with this key file; without one named, beside it.
+    pub fn with_key(file: &Path, key: Option<&Path>) -> Self {
+        let beside = Self::beside(file);
+        Self {
+            key: key.map_or(beside.key, Path::to_owned),
+            ..beside
+        }
+    }
 }
 
 /// A store of people.

@@ -131,9 +131,12 @@ impl KeyRing {
         let _ = writeln!(text, "{END}");
 
         let new = beside(path);
+        // Of a change that was interrupted: its keys may be taken out one day, and nobody would find
+        // these bytes again.
+        discard(&new)?;
         if let Err(error) = write_new(&new, text.as_bytes()) {
             // On a full disk; where even that fails, the next change removes it.
-            let _ = fs::remove_file(&new);
+            let _ = discard(&new);
             return Err(error);
         }
         let old = match OpenOptions::new().write(true).open(path) {
@@ -161,12 +164,22 @@ fn beside(path: &Path) -> PathBuf {
 /// A file of ours alone, on the disk when this is done.
 fn write_new(path: &Path, content: &[u8]) -> io::Result<()> {
     let mut options = OpenOptions::new();
-    options.write(true).create(true).truncate(true).mode(MODE);
-    let mut file = options.open(path)?;
-    // What was left of an interrupted change may have another mode.
-    file.set_permissions(fs::Permissions::from_mode(MODE))?;
+    let mut file = options.write(true).create_new(true).mode(MODE).open(path)?;
     file.write_all(content)?;
     file.sync_all()
+}
+
+/// Overwrites and removes a file, if there is one; of a link the link alone.
+fn discard(path: &Path) -> io::Result<()> {
+    let about = match fs::symlink_metadata(path) {
+        Ok(about) => about,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(error),
+    };
+    if about.is_file() {
+        overwrite(OpenOptions::new().write(true).open(path)?)?;
+    }
+    fs::remove_file(path)
 }
 
 /// Nothing instead of what a file holds, on the disk as far as its file system writes in place.

@@ -5,16 +5,17 @@ use std::f64::consts::FRAC_PI_4;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::passers::Door;
 use super::ring::Ring;
-use super::rooms::{CORNER_M, Row, Visit};
-use super::{WALL_M, passers};
+use super::rooms::{CORNER_M, Rooms, Row, Visit};
+use super::{Side, WALL_M, passers};
 use crate::cast::Cast;
 use crate::floor::RaisedFloor;
 use crate::material::Material;
 use crate::person::Person;
 use crate::preset::World;
 use crate::scene_builder::SceneBuilder;
-use crate::trajectory::{Gait, Trajectory, TrajectoryBuilder};
+use crate::trajectory::{Gait, TrajectoryBuilder};
 
 /// How deep the outer rooms are, metres.
 const ROOM_DEPTH_M: f64 = 5.0;
@@ -44,17 +45,19 @@ fn ring(random: &mut ChaCha8Rng) -> Ring {
     }
 }
 
-/// Who walks in the corridor of the office of `random`, while the robot patrols it.
-pub(crate) fn office_people(
-    random: &mut ChaCha8Rng,
-    robot: &Trajectory,
-    cast: &mut Cast,
-) -> Vec<Person> {
-    passers::people(&ring(random), robot, cast)
+/// Who walks in the office of `random`, while the robot patrols it.
+pub(crate) fn office_people(random: &mut ChaCha8Rng, gait: Gait, cast: &mut Cast) -> Vec<Person> {
+    let (world, ring, doors) = build(random, gait);
+    passers::people(&ring, &doors, &world.trajectory, cast)
 }
 
 /// The office of a seed, with a robot that walks around it and looks into two rooms.
 pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
+    build(random, gait).0
+}
+
+/// The office, its corridor, and the open doors of rooms that the robot does not look into.
+fn build(random: &mut ChaCha8Rng, gait: Gait) -> (World, Ring, Vec<Door>) {
     let ring = ring(random);
     let mut builder = SceneBuilder::new();
     ring.floor_and_ceiling(&mut builder, Material::FLOOR, ROOM_DEPTH_M + 8.0);
@@ -69,7 +72,11 @@ pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
     let ramp_end = RAMP_AT_M + ramp.length_m();
     builder.raised_floor(ramp, Material::FLOOR);
     let inner_depth = (ring.length(1) - 2.0 * ring.half_width - WALL_M) / 2.0;
-    let mut visits = Vec::new();
+    let (mut visits, mut doors) = (Vec::new(), Vec::new());
+    let mut keep = |side: Side, rooms: Rooms| {
+        visits.extend(rooms.visit);
+        doors.extend(rooms.open.into_iter().map(|at| Door { side, at }));
+    };
     for i in 0..4 {
         // Where the ramp is there are no doors: the outer wall begins a half width earlier, the
         // inner one later.
@@ -86,7 +93,7 @@ pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
             visited: i == 0,
             windows: true,
         };
-        visits.push(outer.build(&mut builder, ring.ceiling, random));
+        keep(outer.side, outer.build(&mut builder, ring.ceiling, random));
         let inner = Row {
             side: ring.inner(i),
             span: [0.0, ring.length(i) - 2.0 * ring.half_width],
@@ -97,13 +104,12 @@ pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
             windows: false,
         };
         if i % 2 == 0 {
-            visits.push(inner.build(&mut builder, ring.ceiling, random));
+            keep(inner.side, inner.build(&mut builder, ring.ceiling, random));
         } else {
             inner.plain(&mut builder, ring.ceiling, random);
         }
     }
     exit_signs(&mut builder, &ring);
-    let visits: Vec<Visit> = visits.into_iter().flatten().collect();
     let mut patrol = TrajectoryBuilder::new([0.0, 0.0], 0.0, gait).stand(1.0);
     let corners = ring.corners();
     let mut way: Vec<[f64; 2]> = Vec::new();
@@ -126,7 +132,7 @@ pub(crate) fn office(random: &mut ChaCha8Rng, gait: Gait) -> World {
         .walk(&way)
         .build(scene.floor().clone())
         .expect("the last walk ends at the start, along the first side");
-    World { scene, trajectory }
+    (World { scene, trajectory }, ring, doors)
 }
 
 fn nearest_on_ring(ring: &Ring, visit: &Visit) -> [f64; 2] {

@@ -71,7 +71,7 @@ impl Ring {
     }
 
     /// A place along the centre line and to its left.
-    fn place(&self, way_m: f64, left_m: f64) -> [f64; 2] {
+    pub fn place(&self, way_m: f64, left_m: f64) -> [f64; 2] {
         let ([x0, y0], [x1, y1]) = (self.low, self.high);
         let within = Self {
             low: [x0 + left_m, y0 + left_m],

@@ -1,7 +1,8 @@
 //! Rows of rooms along a corridor: their walls, doors, windows and furniture.
 //!
 //! In: the corridor's wall, the depth of the rooms, a seeded generator. Out: objects in the
-//! builder's scene, and where the robot goes if it looks into one of the rooms.
+//! builder's scene, where the robot goes if it looks into one of the rooms, and the doors that stand
+//! open.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -23,6 +24,19 @@ pub(super) struct Visit {
     pub inside: [f64; 2],
 }
 
+/// A row of rooms that was built.
+#[derive(Default)]
+pub(super) struct Rooms {
+    /// The room that the robot looks into.
+    pub visit: Option<Visit>,
+    /// Where doors stand open to the others, metres along the row.
+    pub open: Vec<f64>,
+}
+
+/// How much of a room is free behind a door: to both sides of its middle and into the room, metres.
+const FREE_ASIDE_M: f64 = 0.9;
+pub(super) const FREE_M: f64 = 1.2;
+
 /// A row of rooms behind a corridor's wall.
 pub(super) struct Row {
     pub side: Side,
@@ -37,13 +51,13 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// Walls, doors, furniture; where the robot goes if it visits one of the rooms.
+    /// Walls, doors, furniture.
     pub fn build(
         &self,
         builder: &mut SceneBuilder,
         ceiling: f64,
         random: &mut ChaCha8Rng,
-    ) -> Option<Visit> {
+    ) -> Rooms {
         let rooms = self.rooms(random);
         // The robot visits the last room with a door that lies well ahead of the start.
         let doors: Vec<Option<f64>> = rooms.iter().map(|room| self.door(room, random)).collect();
@@ -53,7 +67,7 @@ impl Row {
             None
         };
         let mut openings = Vec::new();
-        let mut visit = None;
+        let mut built = Rooms::default();
         for (index, (room, door)) in rooms.iter().zip(&doors).enumerate() {
             let area = Area {
                 low: [room[0] + WALL_M, WALL_M],
@@ -63,17 +77,20 @@ impl Row {
             if let Some(door) = *door {
                 openings.push(Opening::door(door));
                 let is_visited = visited == Some(index);
-                self.leaf(builder, door, is_visited || random.random_bool(0.5));
-                let reach = if is_visited { VISIT_M + 0.9 } else { 1.2 };
+                let open = is_visited || random.random_bool(0.5);
+                self.leaf(builder, door, open);
+                let reach = if is_visited { VISIT_M + 0.9 } else { FREE_M };
                 free.push(Area {
-                    low: [door - 0.9, 0.0],
-                    high: [door + 0.9, reach],
+                    low: [door - FREE_ASIDE_M, 0.0],
+                    high: [door + FREE_ASIDE_M, reach],
                 });
                 if is_visited {
-                    visit = Some(Visit {
+                    built.visit = Some(Visit {
                         side: if self.windows { 0 } else { 2 },
                         inside: self.side.place(door, VISIT_M),
                     });
+                } else if open {
+                    built.open.push(door);
                 }
             }
             furnish(builder, &self.side, area, &free, random);
@@ -90,7 +107,7 @@ impl Row {
         self.side.wall(builder, span, 0.0, ceiling, &openings);
         self.back(builder, &rooms, ceiling, random);
         self.features(builder, &openings, ceiling, random);
-        visit
+        built
     }
 
     /// A wall without doors.

@@ -20,7 +20,7 @@ pub(super) enum Robot {
 }
 
 /// No scene lasts longer, seconds.
-pub(super) const LONGEST_S: f64 = 300.0;
+const LONGEST_S: f64 = 300.0;
 const LOW: [f64; 2] = [-5.0, -7.0];
 const HIGH: [f64; 2] = [13.0, 7.0];
 const HEIGHT_M: f64 = 3.2;

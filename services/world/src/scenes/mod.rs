@@ -7,8 +7,6 @@
 //!
 //! People come from out of the camera's sight and go there; nobody appears in the middle of it.
 
-mod actor;
-
 mod hall;
 mod scripts;
 

@@ -4,8 +4,8 @@
 //! out of its sight, wherever the robot looks.
 
 use super::Script;
-use super::actor::Actor;
 use super::hall::Robot;
+use crate::actor::Actor;
 use crate::camera::Light;
 use crate::cast::Cast;
 use crate::person::{Outfit, Person};

@@ -72,6 +72,10 @@ pub struct PersonReport {
     pub re_identified: u32,
     /// How often they had to be.
     pub re_identifications_needed: u32,
+    /// From when they were in clear sight again to when they were followed again, in the mean; absent
+    /// where they never were.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub re_identified_after_s: Option<f64>,
 }
 
 /// What was seen so far.
@@ -103,6 +107,7 @@ impl Album {
                 wrong_s: score.wrong_s,
                 re_identified: score.right,
                 re_identifications_needed: score.needed,
+                re_identified_after_s: score.mean_delay_s(),
             }),
             shutter_to_target_p99_ms: None,
         }
