@@ -57,7 +57,7 @@ def boxes_of(labels):
 
 
 def jittered(images, labels, random):
-    """Nearer, further, mirrored; other light, other colours, noise."""
+    """Nearer, further, mirrored; other light, other colours, other walls behind people, noise."""
     n = len(images)
     uniform = lambda low, high, *shape: low + (high - low) * torch.rand(*shape, generator=random)
     x = images.permute(0, 3, 1, 2).float() - 114
@@ -72,6 +72,10 @@ def jittered(images, labels, random):
     x = F.grid_sample(x, grid, align_corners=False) + 114
     labels = F.grid_sample(labels[:, None].float(), grid, mode="nearest", align_corners=False)[:, 0]
     gain = uniform(-0.5, 0.35, n, 1, 1, 1).exp() * uniform(0.88, 1.12, n, 3, 1, 1)
+    # Walls and floors of other shades, so that people stand out from what is behind them more or less.
+    behind = uniform(-0.5, 0.5, n, 1, 1, 1).exp() * uniform(0.8, 1.25, n, 3, 1, 1)
+    behind = torch.where(torch.rand(n, 1, 1, 1, generator=random) < 0.6, behind, torch.ones(1))
+    x = torch.where(labels[:, None].round() > 0, x, x * behind)
     x = 255 * (x.clamp(0, 255) / 255) ** uniform(0.8, 1.25, n, 1, 1, 1) * gain
     swap = torch.rand(n, generator=random) < 0.3
     x[swap] = x[swap][:, torch.randperm(3, generator=random)]
@@ -96,7 +100,7 @@ def validate(network, images, labels):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("train"), parser.add_argument("validation"), parser.add_argument("out")
-    parser.add_argument("--steps", type=int, default=1500)
+    parser.add_argument("--steps", type=int, default=2500)
     parser.add_argument("--start", help="weights to go on from")
     arguments = parser.parse_args()
     torch.set_num_threads(2)

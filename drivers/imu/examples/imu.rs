@@ -2,34 +2,31 @@
 //! `cargo run --release -p hachi-imu --example imu -- /dev/i2c-1`.
 #![allow(clippy::print_stdout, reason = "this is what it is for")]
 
-#[cfg(not(target_os = "linux"))]
-fn main() {
-    println!("the buses of this system are not known here");
+use std::path::Path;
+use std::time::Instant;
+
+use hachi_hal::{Clock, Imu, Stamp};
+use hachi_imu::bus::I2C_ADDRESS;
+use hachi_imu::system::{Sleep, open_i2c};
+use hachi_imu::{Icm42688, ImuConfig};
+
+/// Nanoseconds since the program began.
+struct SinceStart(Instant);
+
+impl Clock for SinceStart {
+    fn now(&self) -> Stamp {
+        Stamp::from_nanos(i64::try_from(self.0.elapsed().as_nanos()).unwrap_or(i64::MAX))
+    }
 }
 
-#[cfg(target_os = "linux")]
+const SECOND_NS: i64 = 1_000_000_000;
+
 fn main() -> Result<(), String> {
-    use std::time::Instant;
-
-    use hachi_hal::{Clock, Imu, Stamp};
-    use hachi_imu::bus::I2C_ADDRESS;
-    use hachi_imu::{I2cRegisters, Icm42688, ImuConfig};
-    use linux_embedded_hal::{Delay, I2cdev};
-
-    /// Nanoseconds since the program began.
-    struct SinceStart(Instant);
-    impl Clock for SinceStart {
-        fn now(&self) -> Stamp {
-            Stamp::from_nanos(i64::try_from(self.0.elapsed().as_nanos()).unwrap_or(i64::MAX))
-        }
-    }
-
-    const SECOND_NS: i64 = 1_000_000_000;
     let path = std::env::args().nth(1).unwrap_or("/dev/i2c-1".to_owned());
-    let bus = I2cdev::new(&path).map_err(|error| format!("{path}: {error}"))?;
-    let registers = I2cRegisters::new(bus, I2C_ADDRESS);
+    let registers =
+        open_i2c(Path::new(&path), I2C_ADDRESS).map_err(|fault| format!("{path}: {fault:?}"))?;
     let clock = SinceStart(Instant::now());
-    let mut imu = Icm42688::start(registers, Delay, clock, ImuConfig::default())
+    let mut imu = Icm42688::start(registers, Sleep, clock, ImuConfig::default())
         .map_err(|error| error.to_string())?;
     let mut next = Stamp::from_nanos(0);
     loop {

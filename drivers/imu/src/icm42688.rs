@@ -4,6 +4,7 @@
 //! count of what was left out, by reason.
 
 use core::fmt;
+use core::ops::AddAssign;
 
 use embedded_hal::delay::DelayNs;
 use hachi_hal::{Clock, DeviceError, FaultKind, Imu, ImuSample, Stamp};
@@ -57,6 +58,16 @@ impl ImuCounters {
     }
 }
 
+impl AddAssign for ImuCounters {
+    fn add_assign(&mut self, more: Self) {
+        self.samples += more.samples;
+        self.missed += more.missed;
+        self.not_measured += more.not_measured;
+        self.saturated += more.saturated;
+        self.restarts += more.restarts;
+    }
+}
+
 /// Why there is no sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -93,6 +104,23 @@ impl<E: fmt::Debug> DeviceError for ImuError<E> {
             Self::OtherChip { .. } => FaultKind::FixConfig,
         }
     }
+}
+
+/// Asks the chip who it is. It goes on as it did.
+///
+/// # Errors
+/// It does not answer, or is another.
+pub fn check_identity<R: Registers>(registers: &mut R) -> Result<(), ImuError<R::Error>> {
+    match byte_of(registers, WHO_AM_I)? {
+        ICM_42688_P => Ok(()),
+        got => Err(ImuError::OtherChip { got }),
+    }
+}
+
+fn byte_of<R: Registers>(registers: &mut R, register: u8) -> Result<u8, ImuError<R::Error>> {
+    let mut byte = [0];
+    registers.read(register, &mut byte).map_err(ImuError::Bus)?;
+    Ok(byte[0])
 }
 
 /// An ICM-42688-P.
@@ -157,10 +185,10 @@ impl<R: Registers, D: DelayNs, C: Clock> Icm42688<R, D, C> {
         self.delay.delay_ms(RESET_MS);
         if self.byte(INTERRUPT_STATUS)? & RESET_DONE == 0 {
             // What answers at all but not to this is another chip; else it is this one, stuck.
-            self.check_identity()?;
+            check_identity(&mut self.registers)?;
             return Err(ImuError::NoReset);
         }
-        self.check_identity()?;
+        check_identity(&mut self.registers)?;
         let [gyro, accel] = self.measuring.bytes();
         for (register, written) in [(GYRO_CONFIG, gyro), (ACCEL_CONFIG, accel)] {
             self.write(register, written)?;
@@ -179,23 +207,12 @@ impl<R: Registers, D: DelayNs, C: Clock> Icm42688<R, D, C> {
         Ok(())
     }
 
-    fn check_identity(&mut self) -> Result<(), ImuError<R::Error>> {
-        match self.byte(WHO_AM_I)? {
-            ICM_42688_P => Ok(()),
-            got => Err(ImuError::OtherChip { got }),
-        }
-    }
-
     fn write(&mut self, register: u8, value: u8) -> Result<(), ImuError<R::Error>> {
         self.registers.write(register, value).map_err(ImuError::Bus)
     }
 
     fn byte(&mut self, register: u8) -> Result<u8, ImuError<R::Error>> {
-        let mut byte = [0];
-        self.registers
-            .read(register, &mut byte)
-            .map_err(ImuError::Bus)?;
-        Ok(byte[0])
+        byte_of(&mut self.registers, register)
     }
 
     /// The measurement that is ready, if one is.

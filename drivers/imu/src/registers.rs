@@ -47,7 +47,18 @@ pub enum GyroRange {
 }
 
 impl GyroRange {
-    const fn bits(self) -> u8 {
+    /// The range of so many °/s, if the chip has it here.
+    pub const fn from_dps(dps: u32) -> Option<Self> {
+        Some(match dps {
+            2000 => Self::Dps2000,
+            1000 => Self::Dps1000,
+            500 => Self::Dps500,
+            250 => Self::Dps250,
+            _ => return None,
+        })
+    }
+
+    pub(crate) const fn bits(self) -> u8 {
         match self {
             Self::Dps2000 => 0,
             Self::Dps1000 => 1,
@@ -57,7 +68,7 @@ impl GyroRange {
     }
 
     /// Radians a second of one count.
-    fn unit(self) -> f64 {
+    pub(crate) fn unit(self) -> f64 {
         let degrees = match self {
             Self::Dps2000 => 2_000.0_f64,
             Self::Dps1000 => 1_000.0,
@@ -83,7 +94,18 @@ pub enum AccelRange {
 }
 
 impl AccelRange {
-    const fn bits(self) -> u8 {
+    /// The range of so many g, if the chip has it here.
+    pub const fn from_g(g: u32) -> Option<Self> {
+        Some(match g {
+            16 => Self::G16,
+            8 => Self::G8,
+            4 => Self::G4,
+            2 => Self::G2,
+            _ => return None,
+        })
+    }
+
+    pub(crate) const fn bits(self) -> u8 {
         match self {
             Self::G16 => 0,
             Self::G8 => 1,
@@ -93,7 +115,7 @@ impl AccelRange {
     }
 
     /// m/s² of one count.
-    fn unit(self) -> f64 {
+    pub(crate) fn unit(self) -> f64 {
         let g = match self {
             Self::G16 => 16.0,
             Self::G8 => 8.0,
@@ -119,7 +141,18 @@ pub enum Rate {
 }
 
 impl Rate {
-    const fn bits(self) -> u8 {
+    /// The rate of so many measurements a second, if the chip has it here.
+    pub const fn from_hz(hz: u32) -> Option<Self> {
+        Some(match hz {
+            1000 => Self::Hz1000,
+            500 => Self::Hz500,
+            200 => Self::Hz200,
+            100 => Self::Hz100,
+            _ => return None,
+        })
+    }
+
+    pub(crate) const fn bits(self) -> u8 {
         match self {
             Self::Hz1000 => 6,
             Self::Hz500 => 15,

@@ -1,7 +1,7 @@
 //! The driver over buses that hold it to the chip's data sheet: every byte of a session, and a chip
 //! in registers that measures, is late, loses its power and fails.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 use std::rc::Rc;
 
 use embedded_hal::delay::DelayNs;
@@ -10,9 +10,11 @@ use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction as I2c};
 use embedded_hal_mock::eh1::spi::{Mock as SpiMock, Transaction as Spi};
 use hachi_hal::conformance::check_imu;
 use hachi_hal::{Clock, DeviceError, FaultKind, Imu, Stamp, Vector3};
-use hachi_imu::bus::{I2C_ADDRESS, Registers};
+use hachi_imu::bus::I2C_ADDRESS;
 use hachi_imu::registers::{AccelRange, GyroRange, Measurement, Measuring, Rate};
-use hachi_imu::{I2cRegisters, Icm42688, ImuConfig, ImuError, SpiRegisters};
+use hachi_imu::simulated::{Measures, SimulatedChip};
+use hachi_imu::system::BusFault;
+use hachi_imu::{I2cRegisters, Icm42688, ImuConfig, ImuError, SpiRegisters, check_identity};
 
 const MS: i64 = 1_000_000;
 
@@ -148,125 +150,55 @@ fn measurements_are_scaled_by_their_ranges_and_signed() {
     assert_eq!(Measurement::decode(&bytes, &measuring), None);
 }
 
-/// A chip in registers. Time passes only while it is waited for or looked at.
-#[derive(Clone)]
-struct Chip(Rc<State>);
+/// Time that passes only while something is waited for or looked at: a look takes 20 µs.
+#[derive(Clone, Default)]
+struct Waited(Rc<Cell<i64>>);
 
-struct State {
-    now_ns: Cell<i64>,
-    memory: RefCell<[u8; 128]>,
-    /// When the next measurement is ready, ns.
-    next_ns: Cell<i64>,
-    /// Reads that fail.
-    failing: Cell<u32>,
-    stuck: Cell<bool>,
-    measurement: Cell<[u8; 14]>,
-}
-
-impl Chip {
-    fn new() -> Self {
-        let chip = Self(Rc::new(State {
-            now_ns: Cell::new(0),
-            memory: RefCell::new([0; 128]),
-            next_ns: Cell::new(i64::MAX),
-            failing: Cell::new(0),
-            stuck: Cell::new(false),
-            measurement: Cell::new(AT_REST),
-        }));
-        chip.lose_power();
-        chip
-    }
-
-    fn lose_power(&self) {
-        let mut memory = self.0.memory.borrow_mut();
-        *memory = [0; 128];
-        memory[0x75] = 0x47;
-        memory[0x2D] = 0x10;
-        memory[0x4F] = 0x06;
-        memory[0x50] = 0x06;
-        self.0.next_ns.set(i64::MAX);
-    }
-
-    fn start(&self) -> Result<Icm42688<Self, Self, Self>, ImuError<()>> {
-        Icm42688::start(
-            self.clone(),
-            self.clone(),
-            self.clone(),
-            ImuConfig::default(),
-        )
-    }
-
-    fn set(&self, register: usize, value: u8) {
-        self.0.memory.borrow_mut()[register] = value;
-    }
-
+impl Waited {
     fn pass(&self, ns: i64) {
-        self.0.now_ns.set(self.0.now_ns.get() + ns);
+        self.0.set(self.0.get() + ns);
     }
 }
 
-impl Clock for Chip {
+impl Clock for Waited {
     fn now(&self) -> Stamp {
-        Stamp::from_nanos(self.0.now_ns.get())
+        self.pass(20_000);
+        Stamp::from_nanos(self.0.get())
     }
 }
 
-impl DelayNs for Chip {
+impl DelayNs for Waited {
     fn delay_ns(&mut self, ns: u32) {
         self.pass(i64::from(ns));
     }
 }
 
-impl Registers for Chip {
-    type Error = ();
+type Chip = SimulatedChip<Waited>;
 
-    fn read(&mut self, first: u8, bytes: &mut [u8]) -> Result<(), ()> {
-        // A transfer takes time too.
-        self.pass(20_000);
-        let state = &*self.0;
-        if state.failing.get() > 0 {
-            state.failing.set(state.failing.get() - 1);
-            return Err(());
-        }
-        let now_ns = state.now_ns.get();
-        let mut memory = state.memory.borrow_mut();
-        if now_ns >= state.next_ns.get() {
-            memory[0x2D] |= 0x08;
-            memory[0x1D..0x2B].copy_from_slice(&state.measurement.get());
-            let late = (now_ns - state.next_ns.get()) / (5 * MS) + 1;
-            state.next_ns.set(state.next_ns.get() + late * 5 * MS);
-        }
-        bytes.copy_from_slice(&memory[usize::from(first)..][..bytes.len()]);
-        if first == 0x2D {
-            memory[0x2D] = 0;
-        }
-        Ok(())
-    }
+/// A chip, and the time it lives in.
+fn chip() -> (Chip, Waited) {
+    let time = Waited::default();
+    (SimulatedChip::new(time.clone()), time)
+}
 
-    fn write(&mut self, register: u8, value: u8) -> Result<(), ()> {
-        if register == 0x11 && value == 1 {
-            let identity = self.0.memory.borrow()[0x75];
-            self.lose_power();
-            self.set(0x75, identity);
-            if self.0.stuck.get() {
-                self.set(0x2D, 0);
-            }
-            return Ok(());
-        }
-        if register == 0x4E && value == 0x0F {
-            self.0.next_ns.set(self.0.now_ns.get() + 5 * MS);
-        }
-        self.set(usize::from(register), value);
-        Ok(())
-    }
+fn start(
+    (chip, time): &(Chip, Waited),
+) -> Result<Icm42688<Chip, Waited, Waited>, ImuError<BusFault>> {
+    Icm42688::start(
+        chip.clone(),
+        time.clone(),
+        time.clone(),
+        ImuConfig::default(),
+    )
 }
 
 #[test]
 fn it_keeps_the_promise_of_imus() {
-    let chip = Chip::new();
-    let mut imu = chip.start().unwrap();
-    chip.0.failing.set(1);
-    let tally = check_imu(&mut imu, &chip, 400, 2 * MS).unwrap();
+    let rig = chip();
+    let mut imu = start(&rig).unwrap();
+    let (chip, time) = &rig;
+    chip.fail(1);
+    let tally = check_imu(&mut imu, time, 400, 2 * MS).unwrap();
     assert_eq!(tally.faults, 1);
     assert!(tally.items > 100 && tally.nothing > 100, "{tally:?}");
     assert_eq!(imu.counters().missed, 0);
@@ -274,20 +206,21 @@ fn it_keeps_the_promise_of_imus() {
 
 #[test]
 fn samples_are_stamped_when_they_are_ready_and_missed_ones_counted() {
-    let chip = Chip::new();
-    let mut imu = chip.start().unwrap();
+    let rig = chip();
+    let mut imu = start(&rig).unwrap();
+    let time = &rig.1;
     let by = |ms: i64| Stamp::from_nanos(ms * MS);
     let first = imu.read(by(1_000)).unwrap().unwrap().stamp;
     let second = imu.read(by(1_000)).unwrap().unwrap().stamp;
     let apart_ns = second.nanos_since(first);
     assert!((apart_ns - 5 * MS).abs() < MS, "{apart_ns}");
     assert_eq!(
-        imu.read(chip.now() + MS).unwrap(),
+        imu.read(time.now() + MS).unwrap(),
         None,
         "not ready in a millisecond"
     );
     // Away for five periods.
-    chip.pass(25 * MS);
+    time.pass(25 * MS);
     imu.read(by(1_000)).unwrap().unwrap();
     let missed = imu.counters().missed;
     assert!((4..=5).contains(&missed), "{missed}");
@@ -295,47 +228,65 @@ fn samples_are_stamped_when_they_are_ready_and_missed_ones_counted() {
 
 #[test]
 fn a_chip_that_lost_its_power_is_started_anew() {
-    let chip = Chip::new();
-    let mut imu = chip.start().unwrap();
-    imu.read(chip.now() + 100 * MS).unwrap().unwrap();
+    let rig = chip();
+    let mut imu = start(&rig).unwrap();
+    let (chip, time) = &rig;
+    imu.read(time.now() + 100 * MS).unwrap().unwrap();
     chip.lose_power();
-    let back = imu.read(chip.now() + 500 * MS).unwrap().unwrap();
+    let back = imu.read(time.now() + 500 * MS).unwrap().unwrap();
     near(&back.specific_force, [0.0, 0.0, 9.806_65], 1e-9);
     assert_eq!(imu.counters().restarts, 1);
 }
 
 #[test]
 fn what_the_chip_has_not_measured_is_no_sample() {
-    let chip = Chip::new();
-    let mut imu = chip.start().unwrap();
+    let rig = chip();
+    let mut imu = start(&rig).unwrap();
+    let (chip, time) = &rig;
     let mut none = AT_REST;
     none[4..6].copy_from_slice(&[0x80, 0]);
-    chip.0.measurement.set(none);
-    assert_eq!(imu.read(chip.now() + 12 * MS).unwrap(), None);
-    chip.0.measurement.set([0x7F; 14]);
-    assert!(imu.read(chip.now() + 12 * MS).unwrap().is_some());
+    chip.set(Measures::Bytes(none));
+    assert_eq!(imu.read(time.now() + 12 * MS).unwrap(), None);
+    chip.set(Measures::Bytes([0x7F; 14]));
+    assert!(imu.read(time.now() + 12 * MS).unwrap().is_some());
     let mut end = AT_REST;
     end[8..10].copy_from_slice(&[0x7F, 0xFF]);
-    chip.0.measurement.set(end);
-    assert!(imu.read(chip.now() + 12 * MS).unwrap().is_some());
+    chip.set(Measures::Bytes(end));
+    assert!(imu.read(time.now() + 12 * MS).unwrap().is_some());
     let counters = imu.counters();
     assert!(counters.not_measured >= 2, "{counters:?}");
     assert_eq!(counters.saturated, 1);
 }
 
 #[test]
+fn a_motion_comes_out_as_it_went_in() {
+    let rig = chip();
+    let mut imu = start(&rig).unwrap();
+    let (chip, time) = &rig;
+    let (turning, force) = (Vector3::new(1.0, -2.0, 0.5), Vector3::new(3.0, -4.0, 60.0));
+    chip.set(Measures::Motion(turning, force));
+    let sample = imu.read(time.now() + 12 * MS).unwrap().unwrap();
+    // Half a count of 2000 °/s and 8 g.
+    near(&sample.angular_velocity, turning.into(), 6e-4);
+    near(&sample.specific_force, force.into(), 1.3e-3);
+}
+
+#[test]
 fn what_is_no_such_chip_is_refused_with_what_it_says() {
-    let chip = Chip::new();
+    let mut rig = chip();
     // An MPU-6050.
-    chip.set(0x75, 0x68);
-    let other = chip.start().err().unwrap();
+    rig.0.call_itself(0x68);
+    let other = start(&rig).err().unwrap();
     assert_eq!(other, ImuError::OtherChip { got: 0x68 });
     assert_eq!(other.kind(), FaultKind::FixConfig);
-    let chip = Chip::new();
-    chip.0.stuck.set(true);
-    assert_eq!(chip.start().err(), Some(ImuError::NoReset));
-    let chip = Chip::new();
-    chip.0.failing.set(1);
-    let silent = chip.start().err().unwrap();
+    assert_eq!(check_identity(&mut rig.0), Err(other));
+    let mut rig = chip();
+    assert_eq!(check_identity(&mut rig.0), Ok(()));
+    rig.0.hang(true);
+    assert_eq!(start(&rig).err(), Some(ImuError::NoReset));
+    let rig = chip();
+    rig.0.fail(1);
+    let silent = start(&rig).err().unwrap();
     assert_eq!(silent.kind(), FaultKind::ReadAgain);
+    assert!(silent.to_string().contains("Remote I/O error"), "{silent}");
 }

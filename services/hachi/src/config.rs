@@ -14,6 +14,7 @@ use hachi_slam::SlamConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::exit::Failure;
+use crate::service::settings::imu::ImuSettings;
 use crate::service::settings::{
     CameraConfig, EmergencyStopConfig, LidarConfig, PeopleConfig, RobotConfig, RowConfig,
     ServiceConfig,
@@ -26,9 +27,9 @@ pub enum MotionInput {
     /// Nothing.
     #[default]
     None,
-    /// The recording's inertial samples; needs `lidar_from_imu`.
+    /// The recording's inertial samples (needs `lidar_from_imu`), or the robot's.
     Imu,
-    /// The recording's odometry, of the base; needs the mount.
+    /// The recording's odometry, of the base (needs the mount), or that of the robot's legs.
     Odometry,
 }
 
@@ -50,6 +51,21 @@ impl Mount {
             Vector3::from(self.xyz_m).into(),
             Rotation::from_euler_angles(r, p, y),
         )
+    }
+
+    /// Refuses what can be nobody's mount; `name` is its section.
+    pub(crate) fn check(&self, name: &str) -> Result<(), Unworkable> {
+        for (key, values) in [("xyz_m", self.xyz_m), ("rpy_deg", self.rpy_deg)] {
+            // Farther than any robot is long: a slip of the unit, and then of every pose.
+            if !values.iter().all(|v| v.abs() < 1e3) {
+                return Err(Unworkable {
+                    key: format!("{name}.{key}"),
+                    what: format!("{values:?} can't work"),
+                    next_step: "give three finite numbers below 1000".to_owned(),
+                });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -119,6 +135,8 @@ pub struct Settings {
     pub robot: RobotConfig,
     /// The LiDAR's packets.
     pub lidar: LidarConfig,
+    /// An inertial sensor of its own.
+    pub imu: ImuSettings,
     /// The camera.
     pub camera: CameraConfig,
     /// People in its sight.
@@ -347,22 +365,8 @@ impl MappingConfig {
                 });
             }
         }
-        for (name, mount) in [
-            ("base_from_lidar", &self.base_from_lidar),
-            ("lidar_from_imu", &self.lidar_from_imu),
-        ] {
-            for (key, values) in [("xyz_m", mount.xyz_m), ("rpy_deg", mount.rpy_deg)] {
-                // Farther than any robot is long: a slip of the unit, and then of every pose.
-                if !values.iter().all(|v| v.abs() < 1e3) {
-                    return Err(Unworkable {
-                        key: format!("{name}.{key}"),
-                        what: format!("{values:?} can't work"),
-                        next_step: "give three finite numbers below 1000".to_owned(),
-                    });
-                }
-            }
-        }
-        Ok(())
+        self.base_from_lidar.check("base_from_lidar")?;
+        self.lidar_from_imu.check("lidar_from_imu")
     }
 }
 

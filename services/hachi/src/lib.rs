@@ -16,7 +16,7 @@
 //! | [`record`] | what a run has done so far |
 //! | [`service`] | the service on a robot, task by task |
 //! | [`config`] | settings |
-//! | [`can`] | CAN interfaces of this machine |
+//! | [`can`], [`imu`] | CAN interfaces of this machine, and the bus of its inertial sensor |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
 //! | [`images`] | folders of images |
 //! | [`networks`] | which networks find people and tell them apart |
@@ -35,6 +35,7 @@ pub mod commands;
 pub mod config;
 pub mod exit;
 pub mod images;
+pub mod imu;
 pub mod interrupt;
 pub mod latency;
 pub mod leg_samples;

@@ -15,7 +15,7 @@ use std::io::BufWriter;
 use std::path::Path;
 
 use hachi_bridge::message::Sensor;
-use hachi_hal::{OdometrySample, Stamp};
+use hachi_hal::{ImuSample, OdometrySample, Stamp};
 use hachi_unitree::BodySample;
 use mcap::records::MessageHeader;
 
@@ -25,12 +25,28 @@ use cdr::Cdr;
 /// Bytes of messages that are put together before they go to the disk.
 const CHUNK_BYTES: u64 = 256 << 10;
 
+/// The topic of the inertial sensor on a bus.
+pub const IMU_ON_BUS: &str = "/imu_on_bus";
+
+type Writer = mcap::Writer<BufWriter<File>>;
+
+fn channel(
+    writer: &mut Writer,
+    topic: &str,
+    (name, text): (&str, String),
+) -> Result<u16, mcap::McapError> {
+    let schema = writer.add_schema(name, "ros2msg", text.as_bytes())?;
+    writer.add_channel(schema, topic, "cdr", &BTreeMap::new())
+}
+
 /// A recording that is being written.
 pub struct Recorder {
-    writer: mcap::Writer<BufWriter<File>>,
+    writer: Writer,
     sensor: Sensor,
     lidar: u16,
     imu: u16,
+    /// Of the inertial sensor on a bus, once it has measured.
+    imu_on_bus: Option<u16>,
     joints: u16,
     odometry: u16,
     sequence: u32,
@@ -67,23 +83,20 @@ impl Recorder {
             .compression(None)
             .chunk_size(Some(CHUNK_BYTES));
         let mut writer = options.create(BufWriter::new(file)).map_err(failed)?;
-        let mut channel = |topic: &str, (name, text): (&str, String)| {
-            let schema = writer.add_schema(name, "ros2msg", text.as_bytes())?;
-            writer.add_channel(schema, topic, "cdr", &BTreeMap::new())
-        };
+        let mut channel = |topic, schema| channel(&mut writer, topic, schema).map_err(failed);
         let lidar = match sensor {
-            Sensor::Velodyne => channel("/velodyne_packets", schemas::velodyne_scan()),
-            Sensor::Robosense => channel("/rslidar_packets", schemas::rslidar_packet()),
+            Sensor::Velodyne => channel("/velodyne_packets", schemas::velodyne_scan())?,
+            Sensor::Robosense => channel("/rslidar_packets", schemas::rslidar_packet())?,
         };
-        let lidar = lidar.map_err(failed)?;
-        let imu = channel("/imu", schemas::imu()).map_err(failed)?;
-        let joints = channel("/joint_states", schemas::joint_state()).map_err(failed)?;
-        let odometry = channel("/leg_odometry", schemas::odometry()).map_err(failed)?;
+        let imu = channel("/imu", schemas::imu())?;
+        let joints = channel("/joint_states", schemas::joint_state())?;
+        let odometry = channel("/leg_odometry", schemas::odometry())?;
         Ok(Self {
             writer,
             sensor,
             lidar,
             imu,
+            imu_on_bus: None,
             joints,
             odometry,
             sequence: 0,
@@ -141,14 +154,7 @@ impl Recorder {
     /// The disk does not take it.
     pub fn body(&mut self, body: &BodySample) -> Result<(), mcap::McapError> {
         let q = body.attitude.level_from_base.coords;
-        let mut cdr = Cdr::new(&mut self.bytes);
-        cdr.header(body.imu.stamp, "imu");
-        cdr.f64s(&[q.x, q.y, q.z, q.w]);
-        cdr.f64s(&[0.0; 9]);
-        cdr.f64s(body.imu.angular_velocity.as_slice());
-        cdr.f64s(&[0.0; 9]);
-        cdr.f64s(body.imu.specific_force.as_slice());
-        cdr.f64s(&[0.0; 9]);
+        self.imu(&body.imu, "imu", [q.x, q.y, q.z, q.w], 0.0);
         self.write(self.imu, body.imu.stamp)?;
 
         let legs = &body.legs;
@@ -165,6 +171,32 @@ impl Recorder {
             }
         }
         self.write(self.joints, legs.stamp)
+    }
+
+    /// What the inertial sensor on a bus measured, in the base's axes.
+    ///
+    /// # Errors
+    /// The disk does not take it.
+    pub fn inertial(&mut self, sample: &ImuSample) -> Result<(), mcap::McapError> {
+        let channel = match self.imu_on_bus {
+            Some(channel) => channel,
+            None => channel(&mut self.writer, IMU_ON_BUS, schemas::imu())?,
+        };
+        self.imu_on_bus = Some(channel);
+        self.imu(sample, "base", [0.0, 0.0, 0.0, 1.0], -1.0);
+        self.write(channel, sample.stamp)
+    }
+
+    /// A message; `attitude` is known where the first number of its covariance is not -1.
+    fn imu(&mut self, sample: &ImuSample, frame: &str, attitude: [f64; 4], known: f64) {
+        let mut cdr = Cdr::new(&mut self.bytes);
+        cdr.header(sample.stamp, frame);
+        cdr.f64s(&attitude);
+        cdr.f64s(&[known, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        cdr.f64s(sample.angular_velocity.as_slice());
+        cdr.f64s(&[0.0; 9]);
+        cdr.f64s(sample.specific_force.as_slice());
+        cdr.f64s(&[0.0; 9]);
     }
 
     /// Where the legs say the robot is.

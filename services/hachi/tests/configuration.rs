@@ -68,6 +68,7 @@ fn every_key_that_stands_there_is_understood() {
             ("robot.local_port" | "task.slam.priority" | "task.slam.core", _) => {
                 format!("{key} = 1")
             }
+            ("imu.bus", _) => "imu.bus = \"/dev/i2c-1\"".to_owned(),
             ("emergency_stop.can", _) => "emergency_stop.can = \"can0\"".to_owned(),
             (
                 "camera.serial" | "people.detector" | "people.reid" | "people.store" | "people.key",

@@ -36,6 +36,8 @@ struct Node {
     bus_down: bool,
     told: Option<u8>,
     heartbeat_at: i64,
+    /// Reads of the bus so far.
+    reads: u32,
 }
 
 #[derive(Clone)]
@@ -51,6 +53,7 @@ impl CanBus for Bus {
     fn receive(&mut self, limit: Duration) -> Result<Option<Received>, BusError> {
         assert!(limit.is_zero(), "a task that waits: {limit:?}");
         let mut node = self.0.lock().unwrap();
+        node.reads += 1;
         let now = self.1.now().as_nanos();
         if node.bus_down {
             return Err(BusError::Down(std::io::ErrorKind::NetworkDown.into()));
@@ -154,15 +157,18 @@ impl Rig {
             .norm()
     }
 
-    /// How long until the gate stops the robot for this, ns.
+    /// How long until the gate stops the robot for this fault, ns.
     #[track_caller]
-    fn stops_after(&mut self, cause: Cause) -> i64 {
+    fn stops_after(&mut self, fault: &str) -> i64 {
+        let cause = Cause::EmergencyStop;
         let begun = self.clock.now();
         while !self.signs.causes().iter().any(|c| c == cause) {
             self.pass(MS);
             assert!(self.clock.now().nanos_since(begun) < 2_000 * MS, "never");
         }
-        self.clock.now().nanos_since(begun)
+        let noticed = self.clock.now().nanos_since(begun);
+        program::stop_time(fault, noticed as f64 * 1e-9);
+        noticed
     }
 
     /// It stands, and not because it has nowhere to go.
@@ -188,6 +194,7 @@ const CLOSED: Node = Node {
     bus_down: false,
     told: None,
     heartbeat_at: 0,
+    reads: 0,
 };
 
 #[test]
@@ -197,17 +204,19 @@ fn a_stop_on_the_can_bus_stops_the_robot_and_releases_it_again() {
     rig.walks();
     assert_eq!(rig.health.line(), "running");
     rig.set(|node| node.closed = 0);
-    let noticed = rig.stops_after(Cause::EmergencyStop);
+    let noticed = rig.stops_after("CAN stop pressed");
     assert!(noticed <= 15 * MS, "{noticed} ns");
     rig.stands();
-    // Pressed is no fault of the node.
+    // Pressed is no fault of the node, and no reason to read more: two hundred runs, ten frames.
+    rig.set(|node| node.reads = 0);
     rig.pass(1_000 * MS);
+    rig.set(|node| assert!((205..=215).contains(&node.reads), "{}", node.reads));
     assert_eq!(rig.health.line(), "running");
     rig.set(|node| node.closed = 0b11);
     rig.walks();
     // One of the two contacts opens: a wire is broken.
     rig.set(|node| node.closed = 0b01);
-    let noticed = rig.stops_after(Cause::EmergencyStop);
+    let noticed = rig.stops_after("CAN stop, a wire broken");
     assert!(noticed <= 15 * MS, "{noticed} ns");
     rig.stands();
     rig.pass(1_000 * MS);
@@ -221,7 +230,7 @@ fn a_silent_stop_node_is_taken_for_pressed_and_one_that_comes_back_lets_the_robo
     rig.walks();
     rig.set(|node| node.powered = false);
     // 0.25 s after its last heartbeat, which is up to 0.1 s ago, and two runs of 5 ms.
-    let noticed = rig.stops_after(Cause::EmergencyStop);
+    let noticed = rig.stops_after("CAN stop silent: power");
     assert!((140 * MS..=260 * MS).contains(&noticed), "{noticed} ns");
     rig.stands();
     rig.pass(500 * MS);
@@ -240,7 +249,7 @@ fn a_stop_that_is_pressed_while_its_cable_is_out_is_pressed_when_it_is_back() {
         node.cut_off = true;
         node.closed = 0;
     });
-    rig.stops_after(Cause::EmergencyStop);
+    rig.stops_after("CAN stop silent: cable");
     rig.pass(500 * MS);
     rig.set(|node| node.cut_off = false);
     rig.stands();
@@ -254,7 +263,7 @@ fn a_can_bus_that_goes_down_stops_the_robot_and_is_opened_anew() {
     rig.pass(1_000 * MS);
     rig.walks();
     rig.set(|node| node.bus_down = true);
-    let noticed = rig.stops_after(Cause::EmergencyStop);
+    let noticed = rig.stops_after("CAN bus down");
     assert!(noticed <= 15 * MS, "{noticed} ns");
     rig.stands();
     rig.set(|node| node.bus_down = false);

@@ -28,6 +28,7 @@ fn a_killed_service_leaves_the_robot_standing_and_the_map_whole() {
     // The simulated robot waits a quarter of a second for the next command, and stops within a
     // third from 0.6 m/s.
     let stopped_s = rig.stands_after(before);
+    program::stop_time("service killed", stopped_s);
     assert!(stopped_s < 1.5, "{stopped_s} s");
     assert!(nodes(&rig.map()) > 0);
     // And another one goes on where it was.
@@ -103,6 +104,7 @@ fn a_service_that_is_asked_to_stop_does_and_systemd_hears_of_everything() {
     service.signal(15);
     assert!(service.wait().success(), "{:?}", service.lines());
     let stopped_s = rig.stands_after(before);
+    program::stop_time("service asked to stop", stopped_s);
     assert!(stopped_s < 1.5, "{stopped_s} s");
     until("the end", || count("STOPPING=1") == 1);
     nodes(&rig.map());

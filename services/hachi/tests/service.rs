@@ -73,6 +73,7 @@ fn a_lidar_that_falls_silent_stops_the_robot_and_one_that_comes_back_lets_it_go_
     // 0.35 s until the scan is stale, one turn of the sensor before, half a second of braking; and
     // this machine may be busy.
     let stopped_s = rig.stands_after(before);
+    program::stop_time("LiDAR's cable cut", stopped_s);
     assert!(stopped_s < 2.0, "{stopped_s} s");
     assert!(
         service.said("standing: the lidar shows nothing new"),

@@ -11,6 +11,10 @@ use crate::config::OdometryConfig;
 /// A gap in the samples longer than this is not bridged.
 const MOST_GAP_NS: i64 = 50_000_000;
 
+/// The last sample's rate is taken to hold for this long: the next one may still be on its way when a
+/// scan is placed, as it is from a gyroscope that measures a hundred times a second.
+const MOST_HELD_NS: i64 = 10_000_000;
+
 /// Smallest error an increment is believed to have, metres and radians.
 const LEAST_SIGMA: f64 = 1e-3;
 
@@ -88,7 +92,12 @@ fn integrate(
         turn *= Rotation::from_scaled_axis(step);
         at = end;
     }
-    (at >= to && turn.coords.iter().all(|v| v.is_finite())).then_some(turn)
+    if at < to {
+        let last = samples.last().filter(|s| to - s.stamp <= MOST_HELD_NS)?;
+        let rate = lidar_from_imu * (last.angular_velocity - bias.rad_per_s);
+        turn *= Rotation::from_scaled_axis(rate * to.secs_since(at));
+    }
+    turn.coords.iter().all(|v| v.is_finite()).then_some(turn)
 }
 
 /// Increments over the intervals between `knots` from external odometry.
@@ -169,6 +178,16 @@ mod tests {
             out.is_empty(),
             "samples that end early must not be stretched"
         );
+        // The last is 8 ms old at the end of the scan, then 11.
+        from_gyroscope(&samples[..35], knot, 4, &bias, &config, &mut out);
+        assert_eq!(out.len(), 4);
+        let turn = out[3].motion.rotation.scaled_axis();
+        assert!(
+            (turn - Vector3::new(0.0, 0.0, 0.025)).norm() < 1e-9,
+            "{turn}"
+        );
+        from_gyroscope(&samples[..34], knot, 4, &bias, &config, &mut out);
+        assert!(out.is_empty());
     }
 
     #[test]

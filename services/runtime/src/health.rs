@@ -63,6 +63,8 @@ pub enum Trouble {
     EmergencyStopLost,
     /// The camera sends nothing.
     CameraLost,
+    /// The inertial sensor measures nothing.
+    ImuLost,
     /// The map can't be kept.
     DiskFull,
     /// A model is not there.
@@ -79,11 +81,12 @@ pub enum Trouble {
 
 impl Trouble {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::RobotLost,
         Self::LidarLost,
         Self::EmergencyStopLost,
         Self::CameraLost,
+        Self::ImuLost,
         Self::DiskFull,
         Self::ModelMissing,
         Self::TaskDegraded,
@@ -99,6 +102,7 @@ impl Trouble {
             Self::LidarLost => "lidar lost",
             Self::EmergencyStopLost => "emergency stop lost",
             Self::CameraLost => "camera lost",
+            Self::ImuLost => "inertial sensor lost",
             Self::DiskFull => "disk full",
             Self::ModelMissing => "model missing",
             Self::TaskDegraded => "task degraded",
@@ -111,9 +115,11 @@ impl Trouble {
     /// The state that it puts the service in.
     const fn state(self) -> HealthState {
         match self {
-            Self::RobotLost | Self::LidarLost | Self::EmergencyStopLost | Self::CameraLost => {
-                HealthState::SensorLost
-            }
+            Self::RobotLost
+            | Self::LidarLost
+            | Self::EmergencyStopLost
+            | Self::CameraLost
+            | Self::ImuLost => HealthState::SensorLost,
             Self::DiskFull => HealthState::DiskFull,
             Self::ModelMissing => HealthState::ModelMissing,
             Self::TaskDegraded | Self::LocalisationPoor | Self::TaskDied | Self::Settings => {

@@ -9,6 +9,7 @@ mod socket;
 
 use hachi_hal::{Clock, DeviceError, EmergencyStop, FaultKind, Stamp, StopSample};
 
+use crate::frame::CanFrame;
 use crate::odrive::{Command, CommandError, Message};
 use crate::stop_node::{StopNode, StopNodeConfig, StopReason};
 pub use bus::{BusError, CanBus, Received};
@@ -59,6 +60,28 @@ impl<B: CanBus, C: Clock> CanStop<B, C> {
         self.bad_frames
     }
 
+    /// Takes in a frame that has come, if one has, and does not wait.
+    /// [`reason`](Self::reason) then says what follows.
+    ///
+    /// # Errors
+    /// The bus is down.
+    pub fn take_in(&mut self) -> Result<bool, BusError> {
+        self.ask()?;
+        let now = self.clock.now();
+        let Some((frame, received)) = bus::receive(&mut self.bus, &self.clock, now)? else {
+            return Ok(false);
+        };
+        self.take(&frame, received);
+        Ok(true)
+    }
+
+    /// Whether a frame was one of the node's.
+    fn take(&mut self, frame: &CanFrame, received: Stamp) -> bool {
+        let taken = self.node.take(frame, received);
+        self.bad_frames += u64::from(taken.is_err());
+        taken.unwrap_or(false)
+    }
+
     /// Asks the node for its inputs, where they are not known.
     fn ask(&mut self) -> Result<(), BusError> {
         let now = self.clock.now();
@@ -95,11 +118,10 @@ impl<B: CanBus, C: Clock> EmergencyStop for CanStop<B, C> {
             let silent_at = self.node.falls_silent_at().filter(|_| moving);
             let until = silent_at.map_or(deadline, |at| deadline.min(at + 1));
             match bus::receive(&mut self.bus, &self.clock, until)? {
-                Some((frame, received)) => match self.node.take(&frame, received) {
-                    Ok(true) => return Ok(Some(self.sample(received))),
-                    Ok(false) => {}
-                    Err(_) => self.bad_frames += 1,
-                },
+                Some((frame, received)) if self.take(&frame, received) => {
+                    return Ok(Some(self.sample(received)));
+                }
+                Some(_) => {}
                 None if self.reason().is_some() => {
                     let now = self.clock.now();
                     return Ok(Some(self.sample(now)));

@@ -10,6 +10,7 @@ mod devices;
 mod emergency_stop;
 mod files;
 mod finding;
+mod imu;
 mod machine;
 mod network;
 mod realtime;
@@ -56,6 +57,7 @@ impl Examination {
             network::check(),
             devices::check(),
             emergency_stop::check(),
+            imu::check(),
             #[cfg(all(target_os = "linux", target_pointer_width = "64"))]
             cameras::check(),
             files::check(),

@@ -24,18 +24,19 @@ use tracing::{error, info, warn};
 
 use super::replay::slam;
 use super::simulate::platform_of;
-use crate::can;
 use crate::cli::service::{RecordArguments, RunArguments};
-use crate::config::{MotionInput, Settings};
+use crate::config::Settings;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::recorder::Recorder;
 use crate::service::emergency_stop::StopBus;
 use crate::service::eyes;
+use crate::service::imu::ImuDevice;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
 use crate::service::web::{self, Page};
 use crate::service::wiring::{Devices, Running, Service, assemble};
+use crate::{can, imu};
 
 /// Runs `hachi run`.
 ///
@@ -77,6 +78,7 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
         },
         eyes: eyes::of_this_computer(&settings, clock),
         stop_bus: stop_bus(&settings)?,
+        imu: imu_device(&settings),
     };
     let listen = settings.service.listen;
     let listener = web::listen(listen)
@@ -204,12 +206,6 @@ fn settings(path: &Path) -> Result<(Settings, Platform), Failure> {
             "set robot.platform to b1 or go1",
         ));
     };
-    if settings.motion == MotionInput::Imu {
-        return Err(Failure::new(
-            format_args!("{}: motion = \"imu\" is for recordings", path.display()),
-            "set motion to \"odometry\" (the legs) or \"none\"",
-        ));
-    }
     let platform = platform_of(name)?;
     Ok((settings, platform))
 }
@@ -260,6 +256,17 @@ fn stop_bus(settings: &Settings) -> Result<Option<StopBus>, Failure> {
         None => can::open(&interface, &ids),
     });
     Ok(Some(StopBus { node, open }))
+}
+
+/// The inertial sensor and its bus, where the settings name one. The robot walks without it, so a bus
+/// that is not there does not keep the service from starting.
+fn imu_device(settings: &Settings) -> Option<ImuDevice> {
+    let bus = settings.imu.bus()?;
+    Some(ImuDevice {
+        open: Box::new(move || imu::open(&bus)),
+        measuring: settings.imu.measuring(),
+        base_from_imu: settings.imu.base_from_imu.pose().rotation,
+    })
 }
 
 fn udp_of(settings: &Settings) -> UdpConfig {

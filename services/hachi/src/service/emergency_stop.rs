@@ -6,7 +6,7 @@
 
 use hachi_canbus::stop_node::{StopNodeConfig, StopReason};
 use hachi_canbus::{BusError, CanStop, device::CanBus};
-use hachi_hal::{EmergencyStop, Stamp, StopSample};
+use hachi_hal::{Stamp, StopSample};
 use hachi_runtime::{Progress, Sender, TaskClock, Work};
 use tracing::{info, warn};
 
@@ -107,13 +107,13 @@ impl EmergencyStopTask {
             return;
         };
         for _ in 0..MOST_AT_ONCE {
-            match stop.read_stop(now) {
+            match stop.take_in() {
                 // An interface that is down opens, and fails when it is read.
-                Ok(heard) => {
+                Ok(more) => {
                     if self.opens_at.take().is_some() {
                         info!("the emergency stop's bus is there again");
                     }
-                    if heard.is_none() {
+                    if !more {
                         return;
                     }
                 }

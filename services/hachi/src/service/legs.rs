@@ -1,6 +1,6 @@
 //! `legs`: joints and feet to the ground under the robot and to its motion.
 
-use hachi_hal::{OdometrySample, Pose, Stamp};
+use hachi_hal::{ImuSample, OdometrySample, Pose, Stamp};
 use hachi_runtime::{Progress, Receiver, Sender, Work};
 use hachi_unitree::{BodySample, LegTracker};
 
@@ -12,6 +12,8 @@ pub struct Legs {
     pub bodies: Receiver<BodySample>,
     /// Motion, to the scans' odometry.
     pub motion: Sender<OdometrySample>,
+    /// The robot's inertial samples, to the scans' odometry, where that shall have them.
+    pub inertial: Option<Sender<ImuSample>>,
     /// Where the ground is, to the filters: `footprint_from_base`.
     pub ground: Sender<(Stamp, Pose)>,
     /// To the recorder, if there is one.
@@ -26,6 +28,9 @@ impl Work for Legs {
                 continue;
             };
             let _ = self.motion.send(estimate.motion.sample);
+            if let Some(inertial) = &self.inertial {
+                let _ = inertial.send(sample.imu);
+            }
             if let Some(record) = &self.record {
                 let _ = record.send((sample, estimate.motion.sample));
             }

@@ -10,6 +10,7 @@
 //! | [`base`] | `base command`: hears the robot, asks the gate, tells the robot | 5 ms |
 //! | [`emergency_stop`] | `emergency stop`: a stop's node on a CAN bus, for the gate; where there is one | 5 ms |
 //! | [`lidar`] | `lidar receive`: packets to scans | 4 ms |
+//! | [`imu`] | `imu`: an inertial sensor on a bus, for odometry; where there is one | twice a measurement |
 //! | [`legs`] | `legs`: footprint and leg odometry | a state of the robot |
 //! | [`filter`] | `filter`: obstacles first, then which points are kept | a scan |
 //! | [`odometry`] | `odometry`: where the scan was | a filtered scan |
@@ -35,6 +36,7 @@ pub mod detection;
 pub mod emergency_stop;
 pub mod eyes;
 pub mod filter;
+pub mod imu;
 pub mod keeper;
 pub mod legs;
 pub mod lidar;

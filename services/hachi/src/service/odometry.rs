@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use hachi_behaviour::PlaceEstimate;
-use hachi_hal::{Clock, OdometrySample, Pose, Stamp};
+use hachi_hal::{Clock, ImuSample, OdometrySample, Pose, Stamp};
 use hachi_odometry::{Odometry, ScanInput};
 use hachi_runtime::{Histogram, Progress, Receiver, Sender, TaskClock, Work};
 
@@ -13,7 +13,8 @@ use super::signs::SharedSigns;
 use crate::record::RunRecord;
 use crate::slam_stage::deskew_into;
 
-/// Samples of the legs that are kept for the scan they belong to: half a second of a B1.
+/// Samples of the legs, and inertial ones, that are kept for the scan they belong to: half a second
+/// of a B1, a quarter of a sensor that measures a thousand times a second.
 pub const SAMPLES: usize = 256;
 
 /// The task.
@@ -28,6 +29,10 @@ pub struct OdometryTask {
     pub motion: Receiver<OdometrySample>,
     /// The samples that a scan may ask for.
     pub samples: Vec<OdometrySample>,
+    /// Inertial samples in the base's axes.
+    pub inertial: Receiver<ImuSample>,
+    /// Those that a scan may ask for.
+    pub inertial_samples: Vec<ImuSample>,
     /// From SLAM.
     pub corrections: Receiver<Correction>,
     /// The last of them.
@@ -56,7 +61,8 @@ impl Work for OdometryTask {
         let Some(kept) = self.scans.full.receive() else {
             return Progress::Done;
         };
-        self.gather_samples();
+        gather(&self.motion, &mut self.samples);
+        gather(&self.inertial, &mut self.inertial_samples);
         self.place(&kept);
         self.scans.give_back(kept);
         match self.scans.full.is_empty() {
@@ -67,21 +73,12 @@ impl Work for OdometryTask {
 }
 
 impl OdometryTask {
-    fn gather_samples(&mut self) {
-        while let Some(sample) = self.motion.receive() {
-            if self.samples.len() >= SAMPLES {
-                self.samples.remove(0);
-            }
-            self.samples.push(sample);
-        }
-    }
-
     fn place(&mut self, kept: &Kept) {
         let header = &kept.header;
         let input = ScanInput {
             header,
             points: &kept.points,
-            imu: &[],
+            imu: &self.inertial_samples,
             odometry: match self.uses_legs {
                 true => &self.samples,
                 false => &[],
@@ -121,6 +118,16 @@ impl OdometryTask {
             placed.begun = kept.begun;
             self.out.send(placed);
         }
+    }
+}
+
+/// Takes in what has come, and lets the oldest go.
+fn gather<T>(come: &Receiver<T>, kept: &mut Vec<T>) {
+    while let Some(sample) = come.receive() {
+        if kept.len() >= SAMPLES {
+            kept.remove(0);
+        }
+        kept.push(sample);
     }
 }
 

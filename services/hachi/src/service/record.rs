@@ -5,7 +5,7 @@
 
 use std::sync::atomic::Ordering;
 
-use hachi_hal::{OdometrySample, PacketSource, Received, Stamp};
+use hachi_hal::{ImuSample, OdometrySample, PacketSource, Received, Stamp};
 use hachi_runtime::{Progress, Receiver, Work};
 use hachi_unitree::BodySample;
 use tracing::error;
@@ -81,6 +81,8 @@ pub struct RecorderTask {
     pub packets: BeltEnd<Datagram>,
     /// From the legs.
     pub bodies: Receiver<(BodySample, OdometrySample)>,
+    /// From the inertial sensor on a bus.
+    pub inertial: Receiver<ImuSample>,
     /// What has come since the last run.
     pub batch: Vec<Box<Datagram>>,
     /// Where a full disk is told.
@@ -108,6 +110,7 @@ impl RecorderTask {
     fn write(&mut self) -> Result<(), mcap::McapError> {
         let Some(recorder) = &mut self.recorder else {
             while self.bodies.receive().is_some() {}
+            while self.inertial.receive().is_some() {}
             return Ok(());
         };
         recorder.packets(self.batch.iter().map(|datagram| Packet {
@@ -118,6 +121,9 @@ impl RecorderTask {
         while let Some((body, motion)) = self.bodies.receive() {
             recorder.body(&body)?;
             recorder.motion(&motion)?;
+        }
+        while let Some(sample) = self.inertial.receive() {
+            recorder.inertial(&sample)?;
         }
         Ok(())
     }

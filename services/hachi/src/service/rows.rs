@@ -69,6 +69,17 @@ pub const EMERGENCY_STOP: TaskSpec = hard(row("emergency stop", every(5), 500, 8
 /// Packets to scans.
 pub const LIDAR_RECEIVE: TaskSpec = hard(row("lidar receive", every(4), 1_500, 80), Overrun::Skip);
 
+/// A chip on a bus at its usual rate ([`super::imu::spec`]): twice in a measurement's time, so that
+/// stamps are true.
+pub const IMU: TaskSpec = row(
+    "imu",
+    Trigger::Period {
+        period_ns: 2_500_000,
+    },
+    1_000,
+    75,
+);
+
 /// States of the robot come every 2 ms.
 pub const LEGS: TaskSpec = hard(
     row(
@@ -129,10 +140,11 @@ pub const RECORDER: TaskSpec = row("recorder", every(50), 20_000, 10);
 pub const KEEPER: TaskSpec = row("keeper", every(1_000), 300_000, 5);
 
 /// The tasks of a service, in the order of the table.
-pub const ALL: [TaskSpec; 14] = [
+pub const ALL: [TaskSpec; 15] = [
     BASE_COMMAND,
     EMERGENCY_STOP,
     LIDAR_RECEIVE,
+    IMU,
     LEGS,
     SUPERVISOR,
     FILTER,

@@ -13,6 +13,8 @@ use hachi_unitree::command::CommanderConfig;
 use hachi_unitree::device::ClientConfig;
 use serde::{Deserialize, Serialize};
 
+pub mod imu;
+
 use super::rows;
 use crate::config::{Settings, Unworkable};
 
@@ -270,6 +272,7 @@ pub fn row(settings: &Settings, spec: TaskSpec) -> TaskSpec {
 /// The first such value.
 pub fn check(settings: &Settings) -> Result<(), Unworkable> {
     settings.emergency_stop.check()?;
+    settings.imu.check()?;
     let unworkable = |key: String, what: String, next_step: &str| Unworkable {
         key,
         what,

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU8, AtomicU32, AtomicU64, O
 
 use hachi_behaviour::Causes;
 use hachi_hal::Stamp;
+use hachi_imu::ImuCounters;
 
 /// When something last happened.
 #[derive(Debug)]
@@ -74,6 +75,56 @@ impl Word {
     }
 }
 
+/// What an inertial sensor leaves.
+#[derive(Debug, Default)]
+pub struct ImuSigns {
+    /// When it last measured.
+    pub last: Mark,
+    /// How often it was started, or that was tried.
+    pub starts: AtomicU64,
+    /// Reads, and attempts to start it, that failed.
+    pub faults: AtomicU64,
+    samples: AtomicU64,
+    missed: AtomicU64,
+    not_measured: AtomicU64,
+    saturated: AtomicU64,
+    restarts: AtomicU64,
+}
+
+impl ImuSigns {
+    /// Sets what its driver counted.
+    pub fn set(&self, counters: &ImuCounters) {
+        let ImuCounters {
+            samples,
+            missed,
+            not_measured,
+            saturated,
+            restarts,
+        } = *counters;
+        for (sign, count) in [
+            (&self.samples, samples),
+            (&self.missed, missed),
+            (&self.not_measured, not_measured),
+            (&self.saturated, saturated),
+            (&self.restarts, restarts),
+        ] {
+            sign.store(count, Ordering::Relaxed);
+        }
+    }
+
+    /// What its driver counted.
+    pub fn counters(&self) -> ImuCounters {
+        let count = |sign: &AtomicU64| sign.load(Ordering::Relaxed);
+        ImuCounters {
+            samples: count(&self.samples),
+            missed: count(&self.missed),
+            not_measured: count(&self.not_measured),
+            saturated: count(&self.saturated),
+            restarts: count(&self.restarts),
+        }
+    }
+}
+
 /// What all tasks leave.
 #[derive(Debug)]
 pub struct Signs {
@@ -85,6 +136,8 @@ pub struct Signs {
     pub robot: Mark,
     /// When the emergency stop's node was last well: heard, in operation, its contacts agreeing.
     pub stop_node: Mark,
+    /// Of the inertial sensor on a bus.
+    pub imu: ImuSigns,
     /// The supervisor's last round: the event loop.
     pub event_loop: Mark,
     /// How far the place is to be trusted.
@@ -120,6 +173,7 @@ impl Default for Signs {
             robot: Mark::default(),
             event_loop: Mark::default(),
             stop_node: Mark::default(),
+            imu: ImuSigns::default(),
             condition: Word::of(PLACE_CONDITIONS),
             causes: AtomicU32::default(),
             loops: AtomicU64::default(),

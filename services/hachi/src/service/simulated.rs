@@ -16,6 +16,7 @@ use hachi_world::{CameraConfig, LiveLidar, SensorKind, SimulatedCamera, Simulati
 
 use super::camera::ColorOf;
 use super::emergency_stop::StopBus;
+use super::imu::ImuDevice;
 use super::settings::Platform;
 use super::simulator::{
     MemoryPackets, SeenPeople, SimulatedEye, SimulatorTask, Truth, WalkingBody,
@@ -55,6 +56,8 @@ pub struct Besides {
     pub camera: Option<WatchedCamera>,
     /// An emergency stop's node and its bus.
     pub stop_bus: Option<StopBus>,
+    /// An inertial sensor and its bus.
+    pub imu: Option<ImuDevice>,
 }
 
 /// A camera on the simulated robot, and who sees what it sees.
@@ -124,6 +127,7 @@ pub fn connect(
         packets: packets.clone(),
         sensor: sensor_of(world),
         stop_bus: besides.stop_bus,
+        imu: besides.imu,
     };
     let tasks = TaskClock::new(clock.clone());
     let mut service = assemble(settings, devices, slam, tasks, running, recorder)?;

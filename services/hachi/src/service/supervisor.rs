@@ -25,6 +25,8 @@ pub struct Supervisor {
     pub has_camera: bool,
     /// Whether an emergency stop on a bus is expected.
     pub has_stop_node: bool,
+    /// Whether there is to be an inertial sensor on a bus.
+    pub has_imu: bool,
     /// When it began.
     pub begun: Option<Stamp>,
     /// Whether all was there once, or was waited for.
@@ -50,6 +52,7 @@ impl Work for Supervisor {
         self.tell(Trouble::LidarLost, lost(&signs.scan));
         self.tell(Trouble::RobotLost, lost(&signs.robot));
         self.tell(Trouble::CameraLost, self.has_camera && lost(&signs.camera));
+        self.tell(Trouble::ImuLost, self.has_imu && lost(&signs.imu.last));
         let no_model = signs.model_missing.load(Ordering::Relaxed)
             || signs.network_fails.load(Ordering::Relaxed);
         self.tell(Trouble::ModelMissing, no_model);

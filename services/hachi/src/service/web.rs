@@ -15,7 +15,7 @@ use hachi_runtime::telemetry::LatencyRow;
 use hachi_runtime::{Health, TaskRow, Telemetry, prometheus};
 use serde::{Deserialize, Serialize};
 
-use super::signs::SharedSigns;
+use super::signs::{ImuSigns, SharedSigns};
 
 /// What `/tasks` says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,10 +42,49 @@ pub struct Status {
     pub person: Option<String>,
     /// Charge of the battery, per cent, where it is known.
     pub battery_percent: Option<u32>,
+    /// The inertial sensor on a bus, where there is one.
+    pub imu: Option<ImuStatus>,
     /// Every task.
     pub tasks: Vec<TaskRow>,
     /// Times from end to end.
     pub latencies: Vec<LatencyRow>,
+}
+
+/// What the inertial sensor on a bus did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImuStatus {
+    /// How often it was started, or that was tried.
+    pub starts: u64,
+    /// Reads, and attempts to start it, that failed.
+    pub faults: u64,
+    /// Samples for odometry.
+    pub samples: u64,
+    /// Measurements that nobody fetched in time.
+    pub missed: u64,
+    /// Measurements that the chip marks as none.
+    pub not_measured: u64,
+    /// Samples with a value at the end of its range.
+    pub saturated: u64,
+    /// How often the chip had lost its settings.
+    pub restarts: u64,
+}
+
+impl ImuStatus {
+    /// As it is now; `None` where there is no such sensor.
+    fn of(signs: &ImuSigns) -> Option<Self> {
+        let counters = signs.counters();
+        let starts = signs.starts.load(Ordering::Relaxed);
+        (starts > 0).then(|| Self {
+            starts,
+            faults: signs.faults.load(Ordering::Relaxed),
+            samples: counters.samples,
+            missed: counters.missed,
+            not_measured: counters.not_measured,
+            saturated: counters.saturated,
+            restarts: counters.restarts,
+        })
+    }
 }
 
 impl Status {
@@ -63,6 +102,7 @@ impl Status {
             people_in_view: signs.people_in_view.load(Ordering::Relaxed),
             person: Some(signs.person.get().to_owned()).filter(|word| !word.is_empty()),
             battery_percent: (1..=100).contains(&battery).then_some(battery),
+            imu: ImuStatus::of(&signs.imu),
             tasks: telemetry.rows(),
             latencies: telemetry.latency_rows(),
         }

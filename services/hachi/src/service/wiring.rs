@@ -8,6 +8,8 @@
 //!    │         ↑ wish                      ↓
 //!    └ legs    └──────────────────── behaviour
 //!
+//! chip ─ imu ─ odometry
+//!
 //! pictures ─ camera receive ─ detection ─ tracking
 //! ```
 
@@ -18,7 +20,8 @@ use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Patrol, SafetyGate, S
 use hachi_bridge::message::Sensor;
 use hachi_cloud::Filters;
 use hachi_hal::{LidarScans, PacketSource, Pose, Rotation};
-use hachi_odometry::Odometry;
+use hachi_imu::ImuCounters;
+use hachi_odometry::{Odometry, OdometryConfig};
 use hachi_people::observe::Observer;
 use hachi_people::watch::Watch;
 use hachi_robosense::{RobosenseConfig, RobosenseScans};
@@ -37,6 +40,7 @@ use super::crew::Crew;
 use super::detection::Detection;
 use super::emergency_stop::{EmergencyStopTask, StopBus};
 use super::filter::Filter;
+use super::imu::{ImuDevice, ImuTask};
 use super::keeper::{Kept as KeptPeople, keeper};
 use super::legs::Legs;
 use super::lidar::LidarReceive;
@@ -48,7 +52,7 @@ use super::signs::SharedSigns;
 use super::slam::SlamTask;
 use super::supervisor::Supervisor;
 use super::tracking::{Audience, Tracking};
-use super::{odometry, record, rows};
+use super::{imu, odometry, record, rows};
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::record::RunRecord;
@@ -70,6 +74,8 @@ pub struct Devices<P, L> {
     pub sensor: Sensor,
     /// The emergency stop's node and its bus, where the settings name one.
     pub stop_bus: Option<StopBus>,
+    /// The inertial sensor on a bus, where the settings name one.
+    pub imu: Option<ImuDevice>,
     /// The camera, where there is to be one.
     pub eyes: Option<Eyes>,
 }
@@ -175,6 +181,7 @@ where
     let (bodies, bodies_end) = bounded("bodies", 64, WhenFull::DropOldest, &to_legs);
     // A scan of a tenth of a second asks for the samples of a fifth.
     let (motion, motion_end) = bounded("leg motion", 256, WhenFull::DropOldest, &nobody);
+    let (inertial, inertial_end) = bounded("inertial", 256, WhenFull::DropOldest, &nobody);
     let (ground, ground_end) = bounded("ground", 2, WhenFull::DropOldest, &nobody);
     let (around, around_end) = bounded("obstacles", 2, WhenFull::DropOldest, &nobody);
     let (corrections, corrections_end) = bounded("corrections", 2, WhenFull::DropOldest, &nobody);
@@ -182,6 +189,8 @@ where
     let (to_behaviour, behaviour_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
     let (record_bodies, bodies_to_record) =
         bounded("bodies to record", 64, WhenFull::DropOldest, &nobody);
+    let (record_inertial, inertial_to_record) =
+        bounded("inertial to record", 128, WhenFull::DropOldest, &nobody);
     let (record_packets, packets_to_record) =
         belt::<Datagram>(&table, "packets to record", record::WAITING, &nobody);
     let records = recorder.is_some();
@@ -239,11 +248,33 @@ where
     let bell = table.bell();
     table.add(row(settings, rows::LIDAR_RECEIVE), bell, vec![], receive);
 
+    let has_imu = devices.imu.is_some();
+    // The robot's own samples are for a robot that has no better sensor.
+    let from_the_robot =
+        (!has_imu && settings.motion == MotionInput::Imu).then(|| inertial.clone());
+    if let Some(device) = devices.imu {
+        let spec = row(settings, imu::spec(&device.measuring));
+        let task = ImuTask {
+            device,
+            clock: table.clock().clone(),
+            out: inertial,
+            record: records.then_some(record_inertial),
+            signs: Arc::clone(&signs),
+            sensor: None,
+            starts_at: None,
+            past: ImuCounters::default(),
+            said: None,
+        };
+        let bell = table.bell();
+        table.add(spec, bell, vec![], Box::new(task));
+    }
+
     let gauges = vec![bodies_end.gauge()];
     let legs = Legs {
         tracker: LegTracker::new(devices.platform.robot),
         bodies: bodies_end,
         motion,
+        inertial: from_the_robot,
         ground,
         record: records.then_some(record_bodies),
     };
@@ -254,6 +285,7 @@ where
         signs: Arc::clone(&signs),
         health: table.health().clone(),
         has_stop_node,
+        has_imu,
         begun: None,
         started: false,
     };
@@ -285,17 +317,28 @@ where
     table.add(spec, to_filter, gauges, Box::new(filter));
 
     let spec = row(settings, rows::ODOMETRY);
-    let gauges = vec![kept_end.full.gauge(), motion_end.gauge()];
+    let gauges = vec![
+        kept_end.full.gauge(),
+        motion_end.gauge(),
+        inertial_end.gauge(),
+    ];
     let latencies = [
         table.latency("first packet to pose"),
         table.latency("last packet to pose"),
     ];
+    let config = OdometryConfig {
+        // Samples come in the base's axes.
+        lidar_from_imu: base_from_lidar.rotation.inverse(),
+        ..settings.odometry.clone()
+    };
     let odometry = OdometryTask {
-        odometry: Odometry::new(settings.odometry.clone()),
+        odometry: Odometry::new(config),
         base_from_lidar,
         scans: kept_end,
         motion: motion_end,
         samples: Vec::with_capacity(odometry::SAMPLES),
+        inertial: inertial_end,
+        inertial_samples: Vec::with_capacity(odometry::SAMPLES),
         corrections: corrections_end,
         correction: Correction {
             map_from_odom: Pose::identity(),
@@ -346,11 +389,16 @@ where
     }
 
     if records {
-        let gauges = vec![packets_to_record.full.gauge(), bodies_to_record.gauge()];
+        let gauges = vec![
+            packets_to_record.full.gauge(),
+            bodies_to_record.gauge(),
+            inertial_to_record.gauge(),
+        ];
         let task = RecorderTask {
             recorder,
             packets: packets_to_record,
             bodies: bodies_to_record,
+            inertial: inertial_to_record,
             batch: Vec::with_capacity(record::WAITING + 2),
             signs: Arc::clone(&signs),
         };

@@ -93,6 +93,15 @@ pub fn recording(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
+/// Says how long a robot took to stop for a fault of `docs/safety.md`: with `--nocapture`, and a grep for
+/// `stop time`, what was measured stands in one place.
+pub fn stop_time(fault: &str, seconds: f64) {
+    #[allow(clippy::print_stdout, reason = "this is what it is for")]
+    {
+        println!("stop time | {fault} | {seconds:.3} s");
+    }
+}
+
 /// The text of a path.
 pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()

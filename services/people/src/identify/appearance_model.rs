@@ -111,6 +111,14 @@ impl AppearanceModel {
         (self.distance_mean + SPREADS * self.distance_variance.sqrt()).max(LEAST_THRESHOLD)
     }
 
+    /// Of several features the mean distance is the person's below this: it spreads less than that of
+    /// one. Those of a moment are alike, so that it is never taken to spread by less than half.
+    pub fn threshold_of(&self, features: u32) -> f64 {
+        let share = f64::from(features.clamp(1, 4)).sqrt().recip();
+        let spread = SPREADS * self.distance_variance.sqrt();
+        (self.distance_mean + share * spread).max(LEAST_THRESHOLD)
+    }
+
     /// Learns one more feature of the person, at the distance it has.
     ///
     /// The damped average of CARPE-ID. The published factor for features, `min(1, d/2)`, makes the
@@ -151,6 +159,17 @@ fn least_deviation(feature: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_mean_of_several_features_has_to_be_nearer() {
+        let mut model = AppearanceModel::first(&[1.0, 0.0]).unwrap();
+        (model.distance_mean, model.distance_variance) = (1.5, 0.25);
+        // By hand: 1.5 + 2 * 0.5, and a half of the spread for four and more.
+        assert_eq!(model.threshold(), 2.5);
+        assert_eq!(model.threshold_of(1), 2.5);
+        assert_eq!(model.threshold_of(4), 2.0);
+        assert_eq!(model.threshold_of(100), 2.0);
+    }
 
     #[test]
     fn weights_are_those_of_the_damped_average() {

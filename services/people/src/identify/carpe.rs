@@ -5,10 +5,17 @@
 //! the while what they look like is learnt.
 //!
 //! As the publication's Algorithm 1, with what it leaves open: the distance is computed for a person
-//! matched by track too; in frames where a person's track looks like them, everybody else in the
-//! image is a distractor and stays one until their track ends (the blacklist).
+//! matched by track too; in frames where a person's track looks like them, everybody else apart from
+//! them is a distractor and stays one until their track ends (the blacklist).
+//!
+//! And with what trackers do to it. They hand a track on where people cross: whoever comes out of cover,
+//! or from beside somebody, has to look like the person, and nothing is learnt before they do. Where
+//! looks can't tell the two apart, nobody is followed until the user points at somebody again. A single
+//! look is often wrong: it takes the mean of some to find the person, and the more, the nearer it has to
+//! be.
 
 use super::AppearanceModel;
+use super::others::{Mean, Others, is_as_large, touch};
 use crate::track::{Features, Track};
 
 /// An enrolled person's number.
@@ -22,7 +29,7 @@ pub enum Condition {
     Seen,
     /// In view on a new track, recognised a moment ago.
     Found,
-    /// On their track, which does not look like them any more.
+    /// On their track, which does not look like them any more, or which somebody has who looks the same.
     Unsure,
     /// Not in view since a moment ago.
     #[default]
@@ -86,15 +93,29 @@ impl Default for IdentifierConfig {
 const FOUND_S: f64 = 1.0;
 /// A track whose distance is so many thresholds may have become somebody else's.
 const UNSURE_THRESHOLDS: f64 = 2.0;
+/// A last look with less confidence was unlike: beyond the threshold.
+const UNLIKE_CONFIDENCE: f64 = 0.5;
 /// A track whose looks were hidden for longer may have become somebody else's meanwhile, seconds.
 const HIDDEN_S: f64 = 0.3;
-/// Room for so many names is made at once.
-const USUAL_TRACKS: usize = 128;
+/// One without looks for longer is not followed, seconds.
+const MOST_HIDDEN_S: f64 = 2.0;
+/// So many looks, in the mean near enough, say that a track may be the person's,
+const PROMISING: u32 = 3;
+/// and so many that it is, when that was in doubt.
+const VOUCHING: u32 = 10;
+/// Somebody who looks so much more like the person than the one on a track in doubt is the person.
+const BETTER: f64 = 0.75;
+/// Room for so many is made at once.
+const USUAL_DOUBLES: usize = 16;
 
 struct Person {
     model: AppearanceModel,
-    /// Tracks of others, in order.
-    blacklist: Vec<u64>,
+    others: Others,
+    /// Something hid the person or touched them: looks since then. Until they vouch for the person
+    /// nothing is learnt.
+    doubt: Option<Mean>,
+    /// Tracks that may be the person's instead of their own: looks can't tell them apart.
+    doubles: Vec<u64>,
     since_found_s: f64,
     /// Since when nothing was seen of their looks.
     hidden_s: f64,
@@ -129,7 +150,9 @@ impl Identifier {
         };
         self.people.push(Person {
             model,
-            blacklist: Vec::with_capacity(USUAL_TRACKS),
+            others: Others::new(),
+            doubt: None,
+            doubles: Vec::with_capacity(USUAL_DOUBLES),
             since_found_s: f64::INFINITY,
             hidden_s: 0.0,
             status: Status {
@@ -167,10 +190,10 @@ impl Identifier {
         let dt_s = if dt_s.is_finite() { dt_s.max(0.0) } else { 0.0 };
         let look = |track: &Track| features?.get(track.detection?);
         for person in &mut self.people {
-            person.begin(tracks, dt_s);
+            person.begin(tracks, look, dt_s);
         }
         for person in &mut self.people {
-            person.stay(tracks, look, self.config.adapts);
+            person.stay(tracks, look, self.config.adapts, dt_s);
         }
         self.search(tracks, look);
         for person in &mut self.people {
@@ -187,50 +210,40 @@ impl Identifier {
                     continue;
                 }
                 for (t, track) in tracks.iter().enumerate() {
-                    let Some(distance) = self.candidate(person, track, &look) else {
-                        continue;
+                    let taken = |other: &Person| {
+                        other.status.unseen_s == 0.0 && other.status.track == Some(track.id)
                     };
-                    let share = distance / person.model.threshold();
-                    if share < 1.0 && best.is_none_or(|(least, ..)| share < least) {
+                    if self.people.iter().any(taken) {
+                        continue;
+                    }
+                    let share = person.candidate(track, look(track));
+                    if let Some(share) = share
+                        && best.is_none_or(|(least, ..)| share < least)
+                    {
                         best = Some((share, p, t));
                     }
                 }
             }
-            let Some((share, p, t)) = best else { return };
-            let person = &mut self.people[p];
-            let distance = share * person.model.threshold();
-            person.since_found_s = 0.0;
-            person.appear(
-                &tracks[t],
-                Some(distance),
-                look(&tracks[t]),
-                self.config.adapts,
-            );
+            let Some((_, p, t)) = best else { return };
+            self.people[p].find(&tracks[t], look(&tracks[t]));
         }
-    }
-
-    /// How far a track is from a person, if it may be theirs at all.
-    fn candidate<'a>(
-        &self,
-        person: &Person,
-        track: &Track,
-        look: impl Fn(&Track) -> Option<&'a [f32]>,
-    ) -> Option<f64> {
-        let taken =
-            |other: &Person| other.status.unseen_s == 0.0 && other.status.track == Some(track.id);
-        let open = track.is_confirmed()
-            && track.is_seen()
-            && person.blacklist.binary_search(&track.id).is_err()
-            && !self.people.iter().any(taken);
-        open.then(|| look(track).map(|feature| person.model.distance(feature)))?
     }
 }
 
 impl Person {
     /// A new frame: nobody is in view yet, and tracks that have ended are forgotten.
-    fn begin(&mut self, tracks: &[Track], dt_s: f64) {
-        self.blacklist
-            .retain(|id| tracks.iter().any(|track| track.id == *id));
+    fn begin<'a>(
+        &mut self,
+        tracks: &[Track],
+        look: impl Fn(&Track) -> Option<&'a [f32]>,
+        dt_s: f64,
+    ) {
+        self.others.retain(tracks);
+        for track in tracks.iter().filter(|track| track.is_seen()) {
+            if let Some(distance) = look(track).map(|feature| self.model.distance(feature)) {
+                self.others.look(track.id, distance);
+            }
+        }
         self.since_found_s += dt_s;
         self.hidden_s += dt_s;
         // A frame takes time even where the clock says none: whoever is in view sets it back.
@@ -238,56 +251,137 @@ impl Person {
         self.status.distance = None;
     }
 
-    /// Stays on the track, if it is seen. Everybody else is a distractor then.
+    /// Distance in thresholds.
+    fn share(&self, feature: Option<&[f32]>) -> Option<f64> {
+        let distance = self.model.distance(feature?);
+        distance
+            .is_finite()
+            .then(|| distance / self.model.threshold())
+    }
+
+    /// Stays on the track, if it is seen and shows them. Everybody else is a distractor then.
     fn stay<'a>(
         &mut self,
         tracks: &[Track],
-        look: impl Fn(&Track) -> Option<&'a [f32]>,
+        look: impl Fn(&Track) -> Option<&'a [f32]> + Copy,
         adapts: bool,
+        dt_s: f64,
     ) {
         let own = tracks
             .iter()
             .find(|track| Some(track.id) == self.status.track);
-        let Some(own) = own.filter(|track| track.is_seen()) else {
-            return;
-        };
+        let Some(own) = own else { return };
+        let others = || tracks.iter().filter(|track| track.id != own.id);
         let feature = look(own);
-        let distance = feature.map(|feature| self.model.distance(feature));
-        let distance = distance.filter(|distance| distance.is_finite());
-        // Hidden for a moment, two people may have changed tracks: whoever comes out has to look like
-        // the person, or is searched for like everybody else.
-        let unlike = |d: f64| d > self.model.threshold();
-        if self.hidden_s > HIDDEN_S && distance.is_some_and(unlike) {
+        self.notice_doubles(own, others(), feature.is_some());
+        let share = self.share(feature);
+        let hidden = share.is_none() && self.hidden_s > MOST_HIDDEN_S;
+        if !own.is_seen() || hidden || self.is_handed_on(own, share, others(), look) {
             return;
         }
-        // A track that jumps to somebody else must not make a distractor of the person.
-        let sure = distance.is_some_and(|d| d <= self.model.threshold());
-        self.appear(own, distance, feature, adapts);
-        if !sure {
+        let was_unlike = self.status.confidence < UNLIKE_CONFIDENCE;
+        let doubtful = self.doubt.is_some() || !self.doubles.is_empty();
+        self.appear(own, feature, adapts && !doubtful);
+        if !self.doubles.is_empty() || share.is_none() && was_unlike {
+            self.status.condition = Condition::Unsure;
+        }
+        if doubtful || share.is_none_or(|share| share > 1.0) {
             return;
         }
-        for other in tracks
-            .iter()
-            .filter(|track| track.id != own.id && track.is_seen())
-        {
-            if let Err(place) = self.blacklist.binary_search(&other.id) {
-                self.blacklist.insert(place, other.id);
-            }
+        for other in others().filter(|track| track.is_seen()) {
+            let share = self.share(look(other));
+            self.others.beside(own, other, share, dt_s);
         }
     }
 
-    /// Is in view on this track.
-    fn appear(
+    /// Whether the track shows somebody else by now, as far as looks say. They are asked where the two
+    /// may have been taken for each other, until enough of them vouch for the person.
+    fn is_handed_on<'a, 'b>(
         &mut self,
-        track: &Track,
-        distance: Option<f64>,
-        feature: Option<&[f32]>,
-        adapts: bool,
+        own: &Track,
+        share: Option<f64>,
+        mut others: impl Iterator<Item = &'b Track> + Clone,
+        look: impl Fn(&Track) -> Option<&'a [f32]>,
+    ) -> bool {
+        let alongside = |other: &Track| {
+            self.others.was_apart(other.id) && touch(own, other) && is_as_large(own, other)
+        };
+        let touched = others.clone().any(alongside);
+        if touched || self.hidden_s > HIDDEN_S {
+            self.doubt.get_or_insert_default();
+        }
+        let (Some(mut doubt), Some(share)) = (self.doubt, share) else {
+            return false;
+        };
+        doubt.add(share, VOUCHING);
+        self.doubt = Some(doubt);
+        let latest = self.others.latest(own.id).value / self.model.threshold();
+        let looks_better = |other: &Track| {
+            let other = self.candidate(other, look(other));
+            other.is_some_and(|other| other < BETTER * latest)
+        };
+        if doubt.value > 1.0 || others.any(looks_better) {
+            return true;
+        }
+        if doubt.count >= VOUCHING && !touched {
+            self.doubt = None;
+        }
+        false
+    }
+
+    /// Somebody who looks like the person touches their track while one of the two is not to be seen:
+    /// they may have changed tracks, and nobody can tell, until somebody turns out to look otherwise.
+    fn notice_doubles<'a>(
+        &mut self,
+        own: &Track,
+        others: impl Iterator<Item = &'a Track> + Clone,
+        is_looked_at: bool,
     ) {
+        let threshold = self.model.threshold_of(VOUCHING);
+        for other in others.clone() {
+            let hidden = !is_looked_at || !other.is_seen();
+            let double = other.is_confirmed()
+                && hidden
+                && touch(own, other)
+                && self.others.is_double(other.id, threshold);
+            if double && !self.doubles.contains(&other.id) {
+                self.doubles.push(other.id);
+            }
+        }
+        // One whose track has ended may come back on another.
+        self.doubles.retain(|double| {
+            let there = others.clone().any(|other| other.id == *double);
+            !there || self.others.latest(*double).value < threshold
+        });
+    }
+
+    /// How far a track's latest looks are from the person, in thresholds, if it may be theirs. Looks are
+    /// evidence enough: the tracker need not believe in it yet.
+    fn candidate(&self, track: &Track, feature: Option<&[f32]>) -> Option<f64> {
+        let share = self.share(feature).filter(|share| *share < 1.0)?;
+        let open = self.doubles.is_empty()
+            && track.is_seen()
+            && !self.others.is_somebody_else(track.id, share);
+        let latest = self.others.latest(track.id);
+        let near =
+            latest.count >= PROMISING && latest.value < self.model.threshold_of(latest.count);
+        (open && near).then(|| latest.value / self.model.threshold())
+    }
+
+    /// Is found on another track.
+    fn find(&mut self, track: &Track, feature: Option<&[f32]>) {
+        self.since_found_s = 0.0;
+        self.doubt = Some(Mean::default());
+        self.appear(track, feature, false);
+    }
+
+    /// Is in view on this track.
+    fn appear(&mut self, track: &Track, feature: Option<&[f32]>, learns: bool) {
         self.status.track = Some(track.id);
         self.status.unseen_s = 0.0;
-        self.status.distance = distance;
-        let (Some(distance), Some(feature)) = (distance, feature) else {
+        let distance = feature.map(|feature| self.model.distance(feature));
+        self.status.distance = distance.filter(|distance| distance.is_finite());
+        let (Some(distance), Some(feature)) = (self.status.distance, feature) else {
             return;
         };
         self.hidden_s = 0.0;
@@ -297,7 +391,7 @@ impl Person {
             share if share > UNSURE_THRESHOLDS => Condition::Unsure,
             _ => Condition::Seen,
         };
-        if adapts {
+        if learns {
             self.model.learn(feature, distance);
         }
     }
@@ -500,5 +594,89 @@ mod tests {
         world.show(&[(0.0, BLUE), (300.0, BLUE)]);
         assert_eq!(world.status().condition, Condition::Unsure);
         assert!(world.status().confidence < 0.5);
+    }
+
+    #[test]
+    fn a_part_of_the_person_on_a_track_of_its_own_is_no_distractor() {
+        let mut world = picked();
+        // Legs and all are found; then the whole is not any more, for longer than its track lasts.
+        for _ in 0..20 {
+            world.show(&[(0.0, RED), (300.0, BLUE), (18.0, RED)]);
+        }
+        let part = world.track_at(18.0);
+        assert_ne!(part, world.track_at(0.0));
+        for _ in 0..30 {
+            world.show(&[(300.0, BLUE), (18.0, RED)]);
+        }
+        assert_eq!(world.status().track, part);
+        assert_eq!(world.status().condition, Condition::Seen);
+    }
+
+    #[test]
+    fn a_track_that_never_looked_like_the_person_and_begins_to_was_handed_on() {
+        let mut world = picked();
+        let blue = world.track_at(300.0);
+        // The person goes; later the other track shows them.
+        for _ in 0..30 {
+            world.show(&[(300.0, BLUE)]);
+        }
+        assert_eq!(world.status().condition, Condition::Searching);
+        for _ in 0..6 {
+            world.show(&[(300.0, RED)]);
+        }
+        assert_eq!(world.status().condition, Condition::Found);
+        assert_eq!(world.status().track, blue);
+    }
+
+    #[test]
+    fn nobody_is_followed_where_looks_cannot_tell_two_apart_who_crossed() {
+        let mut world = World::new();
+        for _ in 0..5 {
+            world.show(&[(0.0, RED), (300.0, RED)]);
+        }
+        let (own, twin) = (world.track_at(0.0), world.track_at(300.0));
+        world
+            .identifier
+            .enrol(AppearanceModel::first(&RED).unwrap(), own);
+        for k in 0..26 {
+            world.show(&[(f64::from(k) * 10.0, RED), (300.0, RED)]);
+        }
+        assert_eq!(world.status().condition, Condition::Seen);
+        // One hides the other for a moment.
+        for _ in 0..5 {
+            world.show(&[(300.0, RED)]);
+        }
+        for k in 0..20 {
+            world.show(&[(280.0 - 10.0 * f64::from(k), RED), (300.0, RED)]);
+            assert_ne!(world.status().condition, Condition::Seen);
+            assert_ne!(world.status().condition, Condition::Found);
+        }
+        assert!([own, twin].contains(&world.track_at(300.0)));
+        // Both go; whoever comes back looks the same.
+        for _ in 0..40 {
+            world.show(&[]);
+        }
+        for _ in 0..10 {
+            world.show(&[(100.0, RED)]);
+        }
+        assert_eq!(world.status().condition, Condition::Searching);
+    }
+
+    #[test]
+    fn somebody_who_passes_close_by_is_not_learnt() {
+        let mut world = picked();
+        let before = world.identifier.model(PersonId(1)).unwrap().clone();
+        // Beside each other, the other one half before the person.
+        for k in 0..26 {
+            world.show(&[(0.0, RED), (300.0 - 11.0 * f64::from(k), BLUE)]);
+        }
+        let away = world.identifier.model(PersonId(1)).unwrap().clone();
+        for _ in 0..20 {
+            let mixed = std::array::from_fn(|i| 0.6 * RED[i] + 0.4 * BLUE[i]);
+            world.show(&[(0.0, mixed), (25.0, BLUE)]);
+        }
+        let model = world.identifier.model(PersonId(1)).unwrap();
+        assert_eq!(*model, away);
+        assert_ne!(before, away);
     }
 }

@@ -15,6 +15,7 @@
 pub mod appearance_model;
 pub mod calibration;
 pub mod carpe;
+mod others;
 
 pub use appearance_model::AppearanceModel;
 pub use calibration::{Calibration, CalibrationError};

@@ -9,10 +9,11 @@ use super::finding::Finding;
 
 /// Nodes under `/dev` by kind: how their names begin, and the group that may open them on
 /// Debian and Ubuntu.
-const KINDS: [(&str, &[&str], &str); 3] = [
+const KINDS: [(&str, &[&str], &str); 4] = [
     ("video devices", &["video"], "video"),
     ("serial devices", &["ttyUSB", "ttyACM", "ttyTHS"], "dialout"),
     ("I2C buses", &["i2c-"], "i2c"),
+    ("SPI devices", &["spidev"], "spi"),
 ];
 
 /// More devices of one kind than this are not listed by name.
