@@ -10,9 +10,9 @@
 //!
 //! And with what trackers do to it. They hand a track on where people cross: whoever comes out of cover,
 //! or from beside somebody, has to look like the person, and nothing is learnt before they do. Where
-//! looks can't tell the two apart, nobody is followed until the user points at somebody again. A single
-//! look is often wrong: it takes the mean of some to find the person, and the more, the nearer it has to
-//! be.
+//! looks can't tell the two apart, nobody is followed until the user points at somebody again, or the
+//! other one has been gone for five minutes. A single look is often wrong: it takes the mean of some to
+//! find the person, and the more, the nearer it has to be.
 
 use super::AppearanceModel;
 use super::others::{Mean, Others, is_as_large, touch};
@@ -105,6 +105,8 @@ const PROMISING: u32 = 3;
 const VOUCHING: u32 = 10;
 /// Somebody who looks so much more like the person than the one on a track in doubt is the person.
 const BETTER: f64 = 0.75;
+/// Somebody who looks the same is taken to be about for so long, seconds.
+const ABOUT_S: f64 = 300.0;
 /// Room for so many is made at once.
 const USUAL_DOUBLES: usize = 16;
 
@@ -114,8 +116,9 @@ struct Person {
     /// Something hid the person or touched them: looks since then. Until they vouch for the person
     /// nothing is learnt.
     doubt: Option<Mean>,
-    /// Tracks that may be the person's instead of their own: looks can't tell them apart.
-    doubles: Vec<u64>,
+    /// Tracks that may be the person's instead of their own: looks can't tell them apart. With each how
+    /// long ago it ended, seconds.
+    doubles: Vec<(u64, f64)>,
     since_found_s: f64,
     /// Since when nothing was seen of their looks.
     hidden_s: f64,
@@ -244,6 +247,15 @@ impl Person {
                 self.others.look(track.id, distance);
             }
         }
+        // One whose track has ended may come back on another, for as long as people stay about.
+        let threshold = self.model.threshold_of(VOUCHING);
+        self.doubles.retain_mut(|(double, gone_s)| {
+            if tracks.iter().any(|track| track.id == *double) {
+                return self.others.latest(*double).value < threshold;
+            }
+            *gone_s += dt_s;
+            *gone_s < ABOUT_S
+        });
         self.since_found_s += dt_s;
         self.hidden_s += dt_s;
         // A frame takes time even where the clock says none: whoever is in view sets it back.
@@ -334,25 +346,20 @@ impl Person {
     fn notice_doubles<'a>(
         &mut self,
         own: &Track,
-        others: impl Iterator<Item = &'a Track> + Clone,
+        others: impl Iterator<Item = &'a Track>,
         is_looked_at: bool,
     ) {
         let threshold = self.model.threshold_of(VOUCHING);
-        for other in others.clone() {
+        for other in others {
             let hidden = !is_looked_at || !other.is_seen();
             let double = other.is_confirmed()
                 && hidden
                 && touch(own, other)
                 && self.others.is_double(other.id, threshold);
-            if double && !self.doubles.contains(&other.id) {
-                self.doubles.push(other.id);
+            if double && !self.doubles.iter().any(|(id, _)| *id == other.id) {
+                self.doubles.push((other.id, 0.0));
             }
         }
-        // One whose track has ended may come back on another.
-        self.doubles.retain(|double| {
-            let there = others.clone().any(|other| other.id == *double);
-            !there || self.others.latest(*double).value < threshold
-        });
     }
 
     /// How far a track's latest looks are from the person, in thresholds, if it may be theirs. Looks are

@@ -26,7 +26,7 @@ pub fn person(id: u32, before: Option<&Person>, random: &mut ChaCha8Rng) -> Pers
         .filter(|_| random.random_bool(0.25))
         .map(|person| person.visits[0].outfit.top);
     let outfit = Outfit {
-        top: shared.unwrap_or_else(|| cloth(random, 0.7)),
+        top: shared.unwrap_or_else(|| jacket(random)),
         trousers: cloth(random, 0.35),
         shoes: cloth(random, 0.3),
     };
@@ -56,6 +56,11 @@ pub fn person(id: u32, before: Option<&Person>, random: &mut ChaCha8Rng) -> Pers
             outfit,
         }],
     }
+}
+
+/// Something to wear above the trousers.
+pub fn jacket(random: &mut ChaCha8Rng) -> [u8; 3] {
+    cloth(random, 0.7)
 }
 
 /// A colour of cloth: coloured with this chance, else grey, dark blue or beige.

@@ -20,7 +20,7 @@ use hachi_world::{
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::people::{light, person};
+use crate::people::{jacket, light, person};
 
 const EACH: usize = 12;
 const PICTURE: [f64; 2] = [640.0, 360.0];
@@ -37,8 +37,13 @@ pub fn render(folder: &Path, first_seed: u64, people: u64) -> std::io::Result<()
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         // Else they would be the first people of the buildings with the same seeds.
         random.set_stream(1);
-        let somebody = person(FIRST_ID + seed as u32, None, &mut random);
-        for _ in 0..EACH {
+        let mut somebody = person(FIRST_ID + seed as u32, None, &mut random);
+        // One in two changes the jacket, and is who they were.
+        let changes = random.random_bool(0.5);
+        for number in 0..EACH {
+            if changes && number == EACH / 2 {
+                somebody.visits[0].outfit.top = jacket(&mut random);
+            }
             portrait(&somebody, &mut simulation, &mut random, &mut file)?;
         }
     }
