@@ -290,3 +290,28 @@ fn what_is_no_such_chip_is_refused_with_what_it_says() {
     assert_eq!(silent.kind(), FaultKind::ReadAgain);
     assert!(silent.to_string().contains("Remote I/O error"), "{silent}");
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_is_no_bus_is_said_in_the_systems_words() {
+    use std::path::Path;
+
+    use hachi_imu::system::{open_i2c, open_spi};
+
+    let said = |path: &str| {
+        let path = Path::new(path);
+        let i2c = open_i2c(path, I2C_ADDRESS).err().unwrap();
+        let spi = open_spi(path).err().unwrap();
+        [i2c, spi].map(|fault| format!("{fault:?}"))
+    };
+    for fault in said("/dev/i2c-250") {
+        assert!(fault.contains("No such file or directory"), "{fault}");
+    }
+    // There, and no bus: ENOTTY, by its name or its number.
+    for fault in said("/dev/null") {
+        assert!(
+            fault.contains("ENOTTY") || fault.contains("os error 25"),
+            "{fault}"
+        );
+    }
+}

@@ -2,6 +2,7 @@
 //!
 //! In: a bag with `sensor_msgs/Imu` or `nav_msgs/Odometry`, or a capture with the states of a robot. Out: the samples around each scan.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use hachi_bridge::{Bag, Body, Input, MessageKind};
@@ -11,6 +12,7 @@ use tracing::{info, warn};
 use crate::config::MotionInput;
 use crate::exit::Failure;
 use crate::leg_samples::LegSamples;
+use crate::recorder::IMU_ON_BUS;
 use crate::service::settings::Platform;
 
 /// Samples kept before the last scan's end: a gap of this length is not bridged anyway.
@@ -61,10 +63,16 @@ impl MotionSamples {
             return Err(missing(&input.kind.description()));
         }
         let mut bag = Bag::open(path).map_err(|e| missing(&e))?;
-        if !bag.topics().iter().any(|t| t.kind == Some(kind)) {
+        let of_kind = bag.topics().iter().filter(|t| t.kind == Some(kind));
+        let topics: BTreeSet<String> = of_kind.map(|t| t.name.clone()).collect();
+        // Two sensors in turn would be none: they are mounted apart.
+        let Some(chosen) = topics.get(IMU_ON_BUS).or(topics.first()) else {
             return Err(missing(&"no topic of that type"));
+        };
+        if topics.len() > 1 {
+            warn!(topic = chosen, ?topics, "one of several topics is used");
         }
-        bag.retain(|topic| topic.kind == Some(kind));
+        bag.retain(|topic| topic.kind == Some(kind) && topic.name == *chosen);
         Ok(Self {
             bag: Some(bag),
             ..Self::default()

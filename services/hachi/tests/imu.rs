@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use hachi::config::{MotionInput, Settings};
+use hachi::motion_samples::MotionSamples;
 use hachi::record::RunRecord;
 use hachi::recorder::{IMU_ON_BUS, Recorder};
 use hachi::service::imu::ImuDevice;
@@ -188,13 +189,26 @@ fn what_a_chip_on_a_bus_measures_turns_the_scans_as_the_chip_is_mounted() {
     let (off_m, off_rad) = rig.error();
     assert!(off_m < 0.05 && off_rad < 0.02, "{off_m} m, {off_rad} rad");
     // Told another mount than the chip has, odometry is misled: it does believe the chip.
-    let mut rig = Rig::new(on_its_side(), Rotation::identity(), None);
+    let off = Rotation::from_euler_angles(0.6, 0.0, 0.0);
+    let mut rig = Rig::new(on_its_side(), off * on_its_side(), None);
     rig.pass(9_000);
+    assert_eq!(rig.health.line(), "running");
     let (_, misled_rad) = rig.error();
     assert!(
         misled_rad > 3.0 * off_rad,
         "{misled_rad} rad, {off_rad} rad"
     );
+}
+
+#[test]
+fn a_chip_that_lies_otherwise_than_the_settings_say_is_not_believed() {
+    let mut rig = Rig::new(on_its_side(), Rotation::identity(), None);
+    rig.pass(5_200);
+    assert_eq!(rig.health.line(), "sensor lost: inertial sensor lost");
+    let tilted = rig.signs.imu.tilted.load(Ordering::Relaxed);
+    assert_eq!(tilted, rig.samples());
+    let (off_m, off_rad) = rig.error();
+    assert!(off_m < 0.05 && off_rad < 0.03, "{off_m} m, {off_rad} rad");
 }
 
 #[test]
@@ -282,7 +296,12 @@ fn its_samples_are_kept_beside_the_robots() {
     let mut rig = Rig::new(on_its_side(), on_its_side(), Some(recorder));
     rig.pass(1_000);
     let samples = rig.samples();
+    let (begun, now) = (rig.clock.now() + -1_000 * MS, rig.clock.now());
     drop(rig);
+    // A replay is given the chip's samples alone, not the robot's in between.
+    let mut motion = MotionSamples::open(&path, MotionInput::Imu, None).unwrap();
+    motion.read_until(begun, now);
+    assert_eq!(motion.imu().len() as u64, samples);
     let mut bag = Bag::open(&path).unwrap();
     assert!(bag.topics().iter().any(|topic| topic.name == "/imu"));
     bag.retain(|topic| topic.name == IMU_ON_BUS);

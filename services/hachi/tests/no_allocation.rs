@@ -6,10 +6,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use hachi::config::{MotionInput, Settings};
+use hachi::service::imu::ImuDevice;
 use hachi::service::settings::Platform;
 use hachi::service::simulated::{Besides, connect};
 use hachi::service::wiring::Running;
-use hachi_hal::Stamp;
+use hachi_hal::{Rotation, Stamp};
+use hachi_imu::simulated::SimulatedChip;
 use hachi_runtime::executor::virtual_time::VirtualTime;
 use hachi_runtime::{TaskSpec, VirtualClock};
 use hachi_slam::{MemoryStore, Slam};
@@ -40,6 +42,12 @@ fn main() {
     let slam = Slam::new(settings.slam.clone(), Box::new(MemoryStore::default()));
     // As with threads: without an end, so that no path is kept.
     let running = Running::Threads(1);
+    let chip = SimulatedChip::new(clock.clone());
+    let imu = ImuDevice {
+        open: Box::new(move || Ok(Box::new(chip.clone()))),
+        measuring: settings.imu.measuring(),
+        base_from_imu: Rotation::identity(),
+    };
     let (service, _) = connect(
         &settings,
         &platform,
@@ -47,7 +55,10 @@ fn main() {
         &clock,
         running,
         (slam, None),
-        Besides::default(),
+        Besides {
+            imu: Some(imu),
+            ..Besides::default()
+        },
     )
     .unwrap();
 
@@ -74,6 +85,7 @@ fn main() {
     for task in [
         "base command",
         "lidar receive",
+        "imu",
         "legs",
         "supervisor",
         "filter",

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant, SystemTime};
 use hachi_bridge::message::Sensor;
 use hachi_datagram::{SystemClock, UdpConfig, UdpSource};
 use hachi_hal::{Clock, Stamp};
+use hachi_imu::system::BusFault;
 use hachi_runtime::executor::threads::{self, ThreadsConfig};
 use hachi_runtime::notify::Notifier;
 use hachi_runtime::{Health, SoftWatchdog, TaskClock, Telemetry, Trouble};
@@ -263,7 +264,9 @@ fn stop_bus(settings: &Settings) -> Result<Option<StopBus>, Failure> {
 fn imu_device(settings: &Settings) -> Option<ImuDevice> {
     let bus = settings.imu.bus()?;
     Some(ImuDevice {
-        open: Box::new(move || imu::open(&bus)),
+        open: Box::new(move || {
+            imu::open(&bus).map_err(|fault| BusFault(format!("{bus}: {fault:?}")))
+        }),
         measuring: settings.imu.measuring(),
         base_from_imu: settings.imu.base_from_imu.pose().rotation,
     })

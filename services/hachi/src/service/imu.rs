@@ -5,7 +5,7 @@
 
 use std::sync::atomic::Ordering;
 
-use hachi_hal::{DeviceError, FaultKind, Imu, ImuSample, Rotation, Stamp};
+use hachi_hal::{DeviceError, FaultKind, Imu, ImuSample, Rotation, Stamp, Vector3};
 use hachi_imu::system::{AnyRegisters, BusFault, Sleep};
 use hachi_imu::{Icm42688, ImuConfig, ImuCounters, ImuError};
 use hachi_runtime::{Progress, Sender, TaskClock, TaskSpec, Trigger, Work};
@@ -34,12 +34,21 @@ const AGAIN_NS: i64 = 500_000_000;
 const SILENT_NS: i64 = 500_000_000;
 /// Reads that may fail one after the other before the bus is opened anew: interference is short.
 const FAILURES: u32 = 10;
+/// What stands still feels 1 g upwards, and so does what walks, in the mean over this long, s.
+const UP_S: f64 = 1.0;
+/// Where up is farther from the base's z axis than 45 degrees, the robot has fallen or the mount is not
+/// what the settings say: such turning rates would mislead odometry.
+const LEAST_UP: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Looks in the time of one measurement: none is missed, and its stamp is late by half of that time
 /// at most.
 const LOOKS: i64 = 2;
 /// The share of its period that a run is given. A measurement takes half a millisecond on I2C at
 /// 400 kHz, a tenth of that on SPI.
 const SHARE: f64 = 0.4;
+
+/// Said of a sensor that is not upright.
+const TILTED: &str = "the inertial sensor does not feel up where the base has it: the robot lies on its \
+                      side, or imu.base_from_imu is wrong";
 
 /// The row of a sensor that measures so often.
 pub fn spec(measuring: &ImuConfig) -> TaskSpec {
@@ -80,6 +89,18 @@ pub struct Sensor {
     last: Stamp,
     /// Reads that failed since.
     failures: u32,
+    /// The mean of the specific force, in the base's axes.
+    up: Option<Vector3>,
+}
+
+impl Sensor {
+    /// Whether up is where it is on a robot that is on its feet.
+    fn is_upright(&mut self, force: &Vector3, period_ns: i64) -> bool {
+        let share = (period_ns as f64 * 1e-9 / UP_S).min(1.0);
+        let up = self.up.get_or_insert(*force);
+        *up += (force - *up) * share;
+        up.z > LEAST_UP * up.norm()
+    }
 }
 
 impl Work for ImuTask {
@@ -95,7 +116,7 @@ impl Work for ImuTask {
                 self.pass_on(&sample);
             }
             Ok(None) if now.nanos_since(sensor.last) > SILENT_NS => {
-                self.stop(now, "the inertial sensor measures nothing".to_owned());
+                self.stop(now, "the inertial sensor measures nothing");
             }
             Ok(None) => {}
             Err(error) => self.fault(now, &error),
@@ -125,11 +146,12 @@ impl ImuTask {
                     chip,
                     last: now,
                     failures: 0,
+                    up: None,
                 });
             }
             Err(error) => {
                 self.signs.imu.faults.fetch_add(1, Ordering::Relaxed);
-                self.stop(now, error.to_string());
+                self.stop(now, &error.to_string());
             }
         }
     }
@@ -141,6 +163,15 @@ impl ImuTask {
             angular_velocity: base_from_imu * sample.angular_velocity,
             specific_force: base_from_imu * sample.specific_force,
         };
+        let period_ns = self.device.measuring.rate.period_ns();
+        let Some(sensor) = &mut self.sensor else {
+            return;
+        };
+        if !sensor.is_upright(&sample.specific_force, period_ns) {
+            self.signs.imu.tilted.fetch_add(1, Ordering::Relaxed);
+            self.say(TILTED);
+            return;
+        }
         if self.said.take().is_some() {
             info!("the inertial sensor measures again");
         }
@@ -152,6 +183,14 @@ impl ImuTask {
         }
     }
 
+    /// Says what is wrong, where that is news.
+    fn say(&mut self, why: &str) {
+        if self.said.as_deref() != Some(why) {
+            warn!("{why}");
+            self.said = Some(why.to_owned());
+        }
+    }
+
     fn fault(&mut self, now: Stamp, error: &ImuError<BusFault>) {
         self.signs.imu.faults.fetch_add(1, Ordering::Relaxed);
         let Some(sensor) = &mut self.sensor else {
@@ -159,20 +198,17 @@ impl ImuTask {
         };
         sensor.failures += 1;
         if error.kind() != FaultKind::ReadAgain || sensor.failures >= FAILURES {
-            self.stop(now, error.to_string());
+            self.stop(now, &error.to_string());
         }
     }
 
-    /// Closes the bus, and says why where that is news.
-    fn stop(&mut self, now: Stamp, why: String) {
+    /// Closes the bus, and says why.
+    fn stop(&mut self, now: Stamp, why: &str) {
         if let Some(sensor) = self.sensor.take() {
             self.past += sensor.chip.counters();
         }
         self.starts_at = Some(now + AGAIN_NS);
-        if self.said.as_ref() != Some(&why) {
-            warn!("{why}");
-            self.said = Some(why);
-        }
+        self.say(why);
     }
 
     fn count(&self) {

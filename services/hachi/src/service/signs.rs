@@ -84,6 +84,8 @@ pub struct ImuSigns {
     pub starts: AtomicU64,
     /// Reads, and attempts to start it, that failed.
     pub faults: AtomicU64,
+    /// Samples that were left out because up was not where it should be.
+    pub tilted: AtomicU64,
     samples: AtomicU64,
     missed: AtomicU64,
     not_measured: AtomicU64,

@@ -58,8 +58,10 @@ pub struct ImuStatus {
     pub starts: u64,
     /// Reads, and attempts to start it, that failed.
     pub faults: u64,
-    /// Samples for odometry.
+    /// Samples of the chip.
     pub samples: u64,
+    /// Those of them that odometry is not given: the robot lies on its side, or the mount is wrong.
+    pub tilted: u64,
     /// Measurements that nobody fetched in time.
     pub missed: u64,
     /// Measurements that the chip marks as none.
@@ -79,6 +81,7 @@ impl ImuStatus {
             starts,
             faults: signs.faults.load(Ordering::Relaxed),
             samples: counters.samples,
+            tilted: signs.tilted.load(Ordering::Relaxed),
             missed: counters.missed,
             not_measured: counters.not_measured,
             saturated: counters.saturated,
