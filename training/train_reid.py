@@ -139,7 +139,7 @@ def main():
     parser = argparse.ArgumentParser()
     for name in ("scenes", "portraits", "validation", "out"):
         parser.add_argument(name)
-    parser.add_argument("--steps", type=int, default=1300)
+    parser.add_argument("--steps", type=int, default=1800)
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     torch.manual_seed(1)

@@ -28,6 +28,9 @@ const ALIKE: usize = 3;
 /// Alike places of other pieces that are looked at for each node.
 const RECOGNISED: usize = 8;
 
+/// And where one of them is about to be said, or none was for a while.
+const CHALLENGERS: usize = 32;
+
 /// A node this close to a place shows it, metres.
 const NEIGHBOUR_M: f64 = 8.0;
 
@@ -99,12 +102,17 @@ pub fn recognised(map: &Map, node: &Node, recognition: &mut Recognition, out: &m
     let mut matches = Vec::new();
     let nodes = map.nodes();
     let elsewhere = |id: NodeId| nodes.get(id.index()).is_some_and(|n| n.piece != node.piece);
-    map.places.query(elsewhere, 3 * RECOGNISED, &mut matches);
+    let most = if recognition.asks_everywhere() {
+        CHALLENGERS
+    } else {
+        RECOGNISED
+    };
+    map.places.query(elsewhere, 3 * most, &mut matches);
     let first = out.len();
     for found in matches {
         let old = node_of(&found);
         let known = |c: &Candidate| c.node.0.abs_diff(old.0) <= SAME_PLACE;
-        if out.len() < first + RECOGNISED && !out[first..].iter().any(known) {
+        if out.len() < first + most && !out[first..].iter().any(known) {
             out.push(Candidate {
                 node: old,
                 found_by: FoundBy::Recognition,

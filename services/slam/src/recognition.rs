@@ -3,7 +3,8 @@
 //! In: what alignment found at each place that may be the present one, node after node. Out: where
 //! the whole piece lies, once one place explains what is seen clearly better than every other that
 //! was ever thought of. Two corridors can look alike, a corridor looks alike both ways: then both are
-//! followed, each is asked again at every further node, and nothing is said until one has lost.
+//! followed, each is asked again at every further node, and nothing is said until one has lost. The
+//! winner is challenged by everywhere else that looks at all alike before it is said.
 //! Elsewhere: which places are asked ([`candidates`](crate::candidates)), alignment and lines of sight
 //! ([`closing`](crate::closing)).
 
@@ -52,6 +53,14 @@ const LEAD: f64 = 0.7;
 const ALONE_LIKELY: f64 = 0.5;
 const ALONE_LEAD: f64 = 1.4;
 
+/// Where so many nodes are proven at a place, and none elsewhere as well, what stands in the way of some
+/// lines of sight counts for less: doors, furniture, people.
+const ENDURING: usize = 5;
+const ENDURING_LIKELY: f64 = 0.2;
+
+/// Of so many nodes that are not recognised one is asked everywhere.
+const EVERYWHERE: usize = 6;
+
 /// A place that lags behind the best by a factor of twelve is followed no further.
 const LOST_LEAD: f64 = 2.5;
 
@@ -98,6 +107,8 @@ pub struct Recognition {
     next: u32,
     nodes: usize,
     leading: usize,
+    /// The place that would be said, had it been asked against all others that look alike.
+    challenged: Option<PlaceId>,
 }
 
 impl Recognition {
@@ -106,6 +117,13 @@ impl Recognition {
         self.places.clear();
         self.nodes = 0;
         self.leading = 0;
+        self.challenged = None;
+    }
+
+    /// Whether the next node is asked of many more places than the few that look most alike, among
+    /// which the right one may not have been: before a place is said, and now and then.
+    pub fn asks_everywhere(&self) -> bool {
+        self.challenged.is_some() || self.nodes % EVERYWHERE == EVERYWHERE - 1
     }
 
     /// Nodes that were looked for.
@@ -220,6 +238,7 @@ impl Recognition {
             .max_by(|&a, &b| self.lead(a).total_cmp(&self.lead(b)));
         let Some(best) = best else {
             self.leading = 0;
+            self.challenged = None;
             return None;
         };
         let lead = self.lead(best);
@@ -229,7 +248,10 @@ impl Recognition {
         let likeness = best.at(node).unwrap_or(0.0);
         let together = best.proven() >= AGREEING && likeness >= LIKELY && lead >= LEAD;
         let alone = likeness >= ALONE_LIKELY && lead >= ALONE_LEAD;
-        if !together && !alone {
+        let enduring = best.proven() >= ENDURING && likeness >= ENDURING_LIKELY && lead >= LEAD;
+        let decided = (together || alone || enduring).then_some(best.id);
+        if decided.is_none() || self.challenged != decided {
+            self.challenged = decided;
             self.places.insert(0, best);
             return None;
         }

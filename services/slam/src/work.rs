@@ -293,8 +293,10 @@ impl Workshop {
             return work;
         };
         let mut entry = map.open_entry(stamp, node, candidate.node, candidate.found_by);
-        // Places that were thought of before are asked even so: without that nothing is ever decided.
-        if hurry && candidate.proposed.is_none() {
+        // Places that were thought of before and challengers are asked even so: without that nothing is
+        // ever decided.
+        let must = candidate.proposed.is_some() || self.recognition.asks_everywhere();
+        if hurry && !must {
             refuse(map, entry, Refusal::NoTime, events);
             self.stage = Stage::Proving { node, rest };
         } else if self.closing.begin(map, &mut entry, &candidate, config) {
