@@ -9,6 +9,7 @@
 //! | [`cause`] | why the robot stands, with the log's line for each |
 //! | [`config`] | limits |
 //! | [`obstacles`], [`swept`] | what stands around the robot; where it would stop |
+//! | [`passage`] | ways past things: through doors |
 //! | [`patrol`] | a behaviour: from place to place, round after round |
 //!
 //! A behaviour has wishes; it never has a base. The gate sits outside all of them, so that a wrong
@@ -21,6 +22,7 @@ pub mod config;
 pub mod gate;
 pub mod guarded;
 pub mod obstacles;
+pub mod passage;
 pub mod patrol;
 pub mod swept;
 
@@ -29,4 +31,5 @@ pub use config::{ConfigError, SafetyConfig};
 pub use gate::{SafetyGate, Sight, Verdict};
 pub use guarded::{Body, GuardedBase};
 pub use obstacles::{ObstacleFinder, Obstacles};
+pub use passage::{Passage, Step, Way};
 pub use patrol::{Patrol, PatrolConfig, PlaceEstimate};

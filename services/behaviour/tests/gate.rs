@@ -2,13 +2,8 @@
 
 mod walk;
 
-use hachi_behaviour::{
-    Cause, GuardedBase, Obstacles, Patrol, PatrolConfig, PlaceEstimate, SafetyConfig, SafetyGate,
-    Sight,
-};
-use hachi_hal::{
-    BaseAction, BaseCommand, BaseDrive, BodyPosture, BodyVelocity, Pose, Stamp, StopSample,
-};
+use hachi_behaviour::{Cause, GuardedBase, Obstacles, SafetyConfig, SafetyGate, Sight};
+use hachi_hal::{BaseAction, BaseCommand, BaseDrive, BodyPosture, BodyVelocity, Stamp, StopSample};
 use walk::faults::measure_ms;
 use walk::page::{STATED, millis, row};
 use walk::{MS, STEP_MS, Walk, forward};
@@ -265,48 +260,6 @@ fn what_a_behaviour_wishes_reaches_the_base_only_as_the_gate_lets_it() {
         .unwrap();
     assert!(moved.status.velocity.is_zero());
     assert_eq!(moved.verdict.command.time_to_live_ns, 200 * MS);
-}
-
-/// On a robot that does what it is told, the patrol goes round its places and stops where it is
-/// lost.
-#[test]
-fn a_patrol_reaches_its_places_in_turn() {
-    let places = vec![[2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 0.0]];
-    let mut patrol = Patrol::new(PatrolConfig {
-        places: places.clone(),
-        ..PatrolConfig::default()
-    });
-    let mut walk = Walk::new(SafetyConfig::default());
-    let (mut x, mut y, mut heading) = (0.0f64, 0.0f64, 1.0f64);
-    let mut visits = Vec::new();
-    for _ in 0..6_000 {
-        let place = PlaceEstimate {
-            stamp: walk.now,
-            map_from_base: Pose::new(
-                hachi_hal::Vector3::new(x, y, 0.6),
-                hachi_hal::Vector3::z() * heading,
-            ),
-            trusted: true,
-        };
-        let wish = patrol.step(walk.now, &place).unwrap();
-        let v = walk.step(wish.action).velocity();
-        let dt_s = STEP_MS as f64 * 1e-3;
-        x += v.forward * heading.cos() * dt_s;
-        y += v.forward * heading.sin() * dt_s;
-        heading += v.yaw_rate * dt_s;
-        let near = places.iter().position(|p| (p[0] - x).hypot(p[1] - y) < 0.4);
-        if let Some(near) = near.filter(|n| visits.last() != Some(n)) {
-            visits.push(near);
-        }
-        let lost = PlaceEstimate {
-            trusted: false,
-            ..place
-        };
-        assert_eq!(patrol.step(walk.now, &lost), None);
-    }
-    assert!(patrol.rounds() >= 2, "{}", patrol.rounds());
-    // It starts where the last place is.
-    assert_eq!(visits[..9], [3, 0, 1, 2, 3, 0, 1, 2, 3]);
 }
 
 #[test]

@@ -73,6 +73,8 @@ pub enum Trouble {
     TaskDegraded,
     /// Where the robot is, is guessed in part, or unknown.
     LocalisationPoor,
+    /// The patrol could not get to a place: things stand in the way.
+    WayBlocked,
     /// A task ended that should not have.
     TaskDied,
     /// The settings can't be worked with: the robot is not moved.
@@ -81,7 +83,7 @@ pub enum Trouble {
 
 impl Trouble {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::RobotLost,
         Self::LidarLost,
         Self::EmergencyStopLost,
@@ -91,6 +93,7 @@ impl Trouble {
         Self::ModelMissing,
         Self::TaskDegraded,
         Self::LocalisationPoor,
+        Self::WayBlocked,
         Self::TaskDied,
         Self::Settings,
     ];
@@ -107,6 +110,7 @@ impl Trouble {
             Self::ModelMissing => "model missing",
             Self::TaskDegraded => "task degraded",
             Self::LocalisationPoor => "localisation poor",
+            Self::WayBlocked => "way blocked",
             Self::TaskDied => "task died",
             Self::Settings => "settings",
         }
@@ -122,9 +126,11 @@ impl Trouble {
             | Self::ImuLost => HealthState::SensorLost,
             Self::DiskFull => HealthState::DiskFull,
             Self::ModelMissing => HealthState::ModelMissing,
-            Self::TaskDegraded | Self::LocalisationPoor | Self::TaskDied | Self::Settings => {
-                HealthState::Degraded
-            }
+            Self::TaskDegraded
+            | Self::LocalisationPoor
+            | Self::WayBlocked
+            | Self::TaskDied
+            | Self::Settings => HealthState::Degraded,
         }
     }
 

@@ -123,6 +123,7 @@ pub struct TrajectoryBuilder {
     heading: f64,
     elapsed_s: f64,
     legs: Vec<Leg>,
+    places: Vec<[f64; 2]>,
 }
 
 impl TrajectoryBuilder {
@@ -135,6 +136,7 @@ impl TrajectoryBuilder {
             heading,
             elapsed_s: 0.0,
             legs: Vec::new(),
+            places: Vec::new(),
         }
     }
 
@@ -184,6 +186,7 @@ impl TrajectoryBuilder {
             return self;
         };
         let (_, first) = path.at(0.0);
+        self.places.extend(places);
         self = self.turn_to(first);
         let progress = Rise::with_slope(path.length(), self.gait.speed, self.gait.ramp_s);
         let (end, heading) = path.at(path.length());
@@ -208,6 +211,7 @@ impl TrajectoryBuilder {
         Ok(Trajectory {
             gait: self.gait,
             legs: self.legs,
+            places: self.places,
             period_s: self.elapsed_s,
             floor,
         })
@@ -223,6 +227,7 @@ fn wrapped(angle: f64) -> f64 {
 pub struct Trajectory {
     gait: Gait,
     legs: Vec<Leg>,
+    places: Vec<[f64; 2]>,
     period_s: f64,
     floor: Floor,
 }
@@ -242,6 +247,11 @@ impl Trajectory {
     /// Seconds of one round.
     pub fn period_s(&self) -> f64 {
         self.period_s
+    }
+
+    /// The places that it walks to, in turn, where it stops or goes round a corner; m, map frame.
+    pub fn places(&self) -> &[[f64; 2]] {
+        &self.places
     }
 
     /// Position, heading and share of full speed on the level.

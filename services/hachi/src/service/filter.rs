@@ -30,8 +30,8 @@ pub struct Filter {
     pub ground: Receiver<(Stamp, Pose)>,
     /// From the LiDAR.
     pub scans: BeltEnd<Scan>,
-    /// To the gate.
-    pub obstacles: Sender<Obstacles>,
+    /// To the gate, and to the patrol.
+    pub obstacles: [Sender<Obstacles>; 2],
     /// To odometry.
     pub out: Belt<Kept>,
     /// Helpers.
@@ -56,7 +56,9 @@ impl Work for Filter {
         let usual = self.usual_footprint_from_base * self.base_from_lidar;
         let footprint_from_lidar = felt.unwrap_or(usual);
         let around = self.finder.find(end, &scan.points, &footprint_from_lidar);
-        let _ = self.obstacles.send(around);
+        for out in &self.obstacles {
+            let _ = out.send(around);
+        }
 
         if let Some(mut kept) = self.out.empty.receive() {
             kept.scanned = scan.points.len();

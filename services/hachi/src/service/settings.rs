@@ -330,6 +330,12 @@ pub fn check(settings: &Settings) -> Result<(), Unworkable> {
             "0.01 to 3 m/s",
         ),
         ("patrol.reach_m", patrol.reach_m, 0.05..=5.0, "0.05 to 5 m"),
+        (
+            "patrol.blocked_s",
+            patrol.blocked_s,
+            1.0..=3600.0,
+            "1 to 3600 s",
+        ),
     ];
     for (key, value, range, wanted) in speeds {
         if !range.contains(&value) {

@@ -161,6 +161,8 @@ pub struct Signs {
     pub people_in_view: AtomicU32,
     /// What is known of the first person whom the robot knows.
     pub person: Word,
+    /// Whether the patrol gave up its last place because things stood in the way.
+    pub way_blocked: AtomicBool,
     /// Commands that were cut to a limit.
     pub limited: AtomicU64,
     /// Charge of the battery, per cent; 0 while it is unknown.
@@ -186,6 +188,7 @@ impl Default for Signs {
             network_fails: AtomicBool::default(),
             people_in_view: AtomicU32::default(),
             person: Word::of(PERSON_CONDITIONS),
+            way_blocked: AtomicBool::default(),
             limited: AtomicU64::default(),
             battery_percent: AtomicU32::default(),
         }

@@ -127,28 +127,16 @@ fn start_of(trajectory: &Trajectory) -> ([f64; 2], f64) {
     ([at.x, at.y], ahead.y.atan2(ahead.x))
 }
 
-/// Places along a patrol about a metre apart, as seen from where it begins.
+/// The places of a patrol, as seen from where it begins. Not its rounded corners: a body is longer
+/// than a point, and goes in to a room straight.
 pub fn route(trajectory: &Trajectory) -> Vec<[f64; 2]> {
-    const APART_M: f64 = 1.0;
-    const STEP_S: f64 = 0.1;
     let ([x, y], heading) = start_of(trajectory);
     let (sin, cos) = heading.sin_cos();
-    let mut places: Vec<[f64; 2]> = Vec::new();
-    let mut last = [0.0, 0.0];
-    let steps = (trajectory.period_s() / STEP_S) as usize;
-    for step in 0..steps {
-        let at = trajectory
-            .map_from_base(step as f64 * STEP_S)
-            .translation
-            .vector;
-        let off = [at.x - x, at.y - y];
-        let place = [off[0] * cos + off[1] * sin, off[1] * cos - off[0] * sin];
-        if (place[0] - last[0]).hypot(place[1] - last[1]) >= APART_M {
-            places.push(place);
-            last = place;
-        }
-    }
-    places
+    let seen = |place: &[f64; 2]| {
+        let off = [place[0] - x, place[1] - y];
+        [off[0] * cos + off[1] * sin, off[1] * cos - off[0] * sin]
+    };
+    trajectory.places().iter().map(seen).collect()
 }
 
 /// A packet on its way: when it was received, the port, the payload.

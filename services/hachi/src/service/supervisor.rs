@@ -60,6 +60,8 @@ impl Work for Supervisor {
         self.tell(Trouble::EmergencyStopLost, stop_lost);
         let poor = !matches!(signs.condition.get(), "OK" | "UNKNOWN");
         self.tell(Trouble::LocalisationPoor, poor);
+        let blocked = signs.way_blocked.load(Ordering::Relaxed);
+        self.tell(Trouble::WayBlocked, blocked);
         let full = signs.store_fails.load(Ordering::Relaxed)
             || signs.recording_fails.load(Ordering::Relaxed);
         self.tell(Trouble::DiskFull, full);

@@ -16,10 +16,10 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Patrol, SafetyGate, Sight};
+use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Obstacles, Patrol, SafetyGate, Sight};
 use hachi_bridge::message::Sensor;
 use hachi_cloud::Filters;
-use hachi_hal::{LidarScans, PacketSource, Pose, Rotation};
+use hachi_hal::{LidarScans, PacketSource, Pose, Rotation, Stamp};
 use hachi_imu::ImuCounters;
 use hachi_odometry::{Odometry, OdometryConfig};
 use hachi_people::observe::Observer;
@@ -184,6 +184,7 @@ where
     let (inertial, inertial_end) = bounded("inertial", 256, WhenFull::DropOldest, &nobody);
     let (ground, ground_end) = bounded("ground", 2, WhenFull::DropOldest, &nobody);
     let (around, around_end) = bounded("obstacles", 2, WhenFull::DropOldest, &nobody);
+    let (around_patrol, behaviour_around) = bounded("obstacles", 2, WhenFull::DropOldest, &nobody);
     let (corrections, corrections_end) = bounded("corrections", 2, WhenFull::DropOldest, &nobody);
     let (to_gate, gate_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
     let (to_behaviour, behaviour_places) = bounded("places", 2, WhenFull::DropOldest, &nobody);
@@ -309,7 +310,7 @@ where
         felt: None,
         ground: ground_end,
         scans: scans_end,
-        obstacles: around,
+        obstacles: [around, around_patrol],
         out: kept,
         crew: running.crew(spec.priority),
         level: 0,
@@ -356,9 +357,12 @@ where
     table.add(spec, to_odometry, gauges, Box::new(odometry));
 
     let behaviour = Behaviour {
-        patrol: Patrol::new(settings.patrol.clone()),
+        patrol: Patrol::new(settings.patrol.clone(), settings.safety),
         places: behaviour_places,
         place: None,
+        around: behaviour_around,
+        obstacles: Obstacles::none(Stamp::default()),
+        signs: Arc::clone(&signs),
         wishes,
     };
     let bell = table.bell();

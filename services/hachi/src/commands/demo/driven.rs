@@ -43,7 +43,7 @@ const SLICE_NS: i64 = 100_000_000;
 /// Between two tables on the screen.
 const REFRESH: Duration = Duration::from_millis(500);
 
-/// A place of the patrol is reached when the robot is this near, m: places are a metre apart.
+/// A place of the patrol is reached when the robot is this near, m.
 const REACH_M: f64 = 0.5;
 
 /// Walks the robot round its patrol.
