@@ -217,6 +217,27 @@ mod tests {
         );
     }
 
+    /// The frame of a door 1.0 m wide, ahead and to the left, through returns that err by 2 cm.
+    #[test]
+    fn what_stands_beside_the_way_is_aside_where_it_is_and_ahead_never_farther() {
+        let mut finder = ObstacleFinder::new(&SafetyConfig::default());
+        for ahead in [0.70f32, 0.83, 0.95, 1.07, 1.18] {
+            let errs = [-0.02f32, 0.02, 0.0, -0.02, 0.02, 0.0];
+            let frame = errs.map(|err| point(ahead, 0.5 + err, -0.2));
+            let found = finder.find(Stamp::default(), &frame, &mounted());
+            let nearest = found.places().iter().map(|[_, y]| *y);
+            let nearest = nearest.fold(f32::INFINITY, f32::min);
+            // Neighbouring sectors may have a part of them each.
+            assert!((nearest - 0.5).abs() < 0.0201, "{ahead}: {found:?}");
+            assert!(
+                found
+                    .places()
+                    .iter()
+                    .all(|[x, _]| *x <= ahead && *x > ahead - 0.15)
+            );
+        }
+    }
+
     #[test]
     fn two_stray_returns_stop_nobody_and_neither_does_nonsense() {
         let mut finder = ObstacleFinder::new(&SafetyConfig::default());

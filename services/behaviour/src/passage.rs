@@ -9,7 +9,8 @@
 //! nearest free one, steps sideways into its middle, and only then walks on. A door is a gap that a
 //! lane fits through. Where there is no room to turn round, it walks out backwards.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
+use std::ops::Range;
 
 use hachi_hal::BodyVelocity;
 
@@ -63,6 +64,11 @@ const BESIDE_M: f64 = 0.05;
 /// In a narrow lane the robot turns to its direction before it walks, rad.
 const TURNED_RAD: f64 = 0.06;
 
+/// A goal at these bearings is neither before the robot nor behind it, rad: 60 to 110 degrees.
+const ABREAST_RAD: Range<f64> = 1.05..1.9;
+/// It turns round again where it has this much more room than it needs, m.
+const TURNING_SPARE_M: f64 = 0.03;
+
 /// What moves less than this, m/s or rad/s, stands.
 const SLOWEST: f64 = 0.02;
 
@@ -94,8 +100,13 @@ impl Passage {
 
     /// The velocity towards `way` among `obstacles`.
     pub fn step(&mut self, way: &Way, obstacles: &Obstacles) -> Step {
-        let behind = way.bearing_rad.abs() > FRAC_PI_2;
-        self.backwards = behind && (self.backwards || !self.can_turn_round(obstacles));
+        // A goal that lies abreast must not change the way it faces again and again.
+        let (behind_rad, spare_m) = match self.backwards {
+            true => (ABREAST_RAD.start, TURNING_SPARE_M),
+            false => (ABREAST_RAD.end, 0.0),
+        };
+        let behind = way.bearing_rad.abs() > behind_rad;
+        self.backwards = behind && !self.can_turn_round(spare_m, obstacles);
         let velocity = match self.backwards {
             // The robot's outline is the same both ways round.
             true => {
@@ -121,8 +132,8 @@ impl Passage {
     }
 
     /// Whether it can turn on the spot all the way round.
-    fn can_turn_round(&self, obstacles: &Obstacles) -> bool {
-        let radius = self.turning_radius_m();
+    fn can_turn_round(&self, spare_m: f64, obstacles: &Obstacles) -> bool {
+        let radius = self.turning_radius_m() + spare_m;
         let away = |[x, y]: &[f32; 2]| f64::from(*x).hypot(f64::from(*y)) >= radius;
         obstacles.places().iter().all(away)
     }
