@@ -37,18 +37,8 @@ fn the_json_lists_findings_and_agrees_with_the_exit_status() {
 
 #[test]
 fn an_emergency_stop_whose_bus_is_not_there_is_named() {
-    let folder = tempfile::tempdir().unwrap();
     let settings = "[emergency_stop]\ncan = \"nobus9\"\nnode = 7\n";
-    program::file(folder.path(), "hachi.toml", settings);
-    let output = program::hachi()
-        .args(["doctor", "--json"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    let run = program::finished(output);
-    let json: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
-    let mut findings = json["findings"].as_array().unwrap().iter();
-    let stop = findings.find(|f| f["name"] == "emergency stop").unwrap();
+    let stop = program::doctor_finding(settings, "emergency stop");
     assert_eq!(stop["level"], "warn");
     let what = stop["what"].as_str().unwrap();
     assert!(what.contains("node 7 on nobus9"), "{what}");

@@ -361,21 +361,7 @@ fn settings_that_cannot_work_are_said_with_their_line() {
 
 #[test]
 fn doctor_says_whether_the_chip_is_there() {
-    let folder = tempfile::tempdir().unwrap();
-    program::file(
-        folder.path(),
-        "hachi.toml",
-        "[imu]\nbus = \"/dev/i2c-250\"\n",
-    );
-    let output = program::hachi()
-        .args(["doctor", "--json"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    let run = program::finished(output);
-    let json: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
-    let mut findings = json["findings"].as_array().unwrap().iter();
-    let imu = findings.find(|f| f["name"] == "inertial sensor").unwrap();
+    let imu = program::doctor_finding("[imu]\nbus = \"/dev/i2c-250\"\n", "inertial sensor");
     assert_eq!(imu["level"], "warn");
     let what = imu["what"].as_str().unwrap();
     assert!(what.starts_with("0x68 on /dev/i2c-250: "), "{what}");

@@ -156,3 +156,17 @@ pub fn whole_results(out: &Path) -> serde_json::Value {
     }
     report
 }
+
+/// What `hachi doctor` finds under this name, in a folder with these settings.
+pub fn doctor_finding(settings: &str, name: &str) -> serde_json::Value {
+    let folder = tempfile::tempdir().unwrap();
+    file(folder.path(), "hachi.toml", settings);
+    let output = hachi()
+        .args(["doctor", "--json"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let json: serde_json::Value = serde_json::from_str(&finished(output).stdout).unwrap();
+    let mut findings = json["findings"].as_array().unwrap().iter();
+    findings.find(|f| f["name"] == name).unwrap().clone()
+}

@@ -16,6 +16,7 @@ pub mod appearance_model;
 pub mod calibration;
 pub mod carpe;
 mod others;
+mod person;
 
 pub use appearance_model::AppearanceModel;
 pub use calibration::{Calibration, CalibrationError};

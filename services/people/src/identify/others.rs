@@ -64,6 +64,11 @@ impl Others {
             .retain(|d| tracks.iter().any(|track| track.id == d.track));
     }
 
+    fn get(&self, track: u64) -> Option<&Other> {
+        let place = self.0.binary_search_by_key(&track, |other| other.track);
+        place.ok().map(|place| &self.0[place])
+    }
+
     fn of(&mut self, track: u64) -> &mut Other {
         let place = self.0.binary_search_by_key(&track, |other| other.track);
         let place = place.unwrap_or_else(|place| {
@@ -86,8 +91,8 @@ impl Others {
 
     /// The mean of its latest looks.
     pub fn latest(&self, track: u64) -> Mean {
-        let place = self.0.binary_search_by_key(&track, |other| other.track);
-        place.map_or(Mean::default(), |place| self.0[place].latest)
+        self.get(track)
+            .map_or(Mean::default(), |other| other.latest)
     }
 
     /// In a frame of so many seconds another track surely shows the person, and this one looks so far
@@ -105,16 +110,14 @@ impl Others {
 
     /// Whether a track was apart from the person for long enough to be somebody else's.
     pub fn was_apart(&self, track: u64) -> bool {
-        let place = self.0.binary_search_by_key(&track, |other| other.track);
-        place.is_ok_and(|place| self.0[place].apart_s >= APART_S)
+        self.get(track)
+            .is_some_and(|other| other.apart_s >= APART_S)
     }
 
     /// Whether a track is surely somebody else's who was hard to tell from the person lately: their
     /// looks are nearer than this statistical distance.
     pub fn is_double(&self, track: u64, threshold: f64) -> bool {
-        let place = self.0.binary_search_by_key(&track, |other| other.track);
-        place.is_ok_and(|place| {
-            let other = &self.0[place];
+        self.get(track).is_some_and(|other| {
             let near = other.latest.count > 0 && other.latest.value < threshold;
             other.apart_s >= APART_S && near
         })
@@ -122,9 +125,7 @@ impl Others {
 
     /// Whether a track that looks so far from the person now, in thresholds, is somebody else's.
     pub fn is_somebody_else(&self, track: u64, share: f64) -> bool {
-        let place = self.0.binary_search_by_key(&track, |other| other.track);
-        place.is_ok_and(|place| {
-            let other = &self.0[place];
+        self.get(track).is_some_and(|other| {
             let unlike = other.beside.count > 0 && other.beside.value > UNLIKE;
             other.apart_s >= APART_S && !(unlike && share < 1.0)
         })
