@@ -314,6 +314,21 @@ fn people_codec() -> Vec<Vec<u8>> {
     vec![encode_record(&record), encode_model(&network, &model)]
 }
 
+/// What a browser asks, what a program orders, and the answer to it.
+fn http_request() -> Vec<Vec<u8>> {
+    let order = "{\"at\":[320,180]}";
+    vec![
+        b"GET /people HTTP/1.1\r\nHost: localhost:9470\r\nOrigin: http://localhost:9470\r\n\r\n".to_vec(),
+        format!(
+            "POST /people/pick HTTP/1.1\r\nHost: [::1]:9470\r\nContent-Type: application/json\r\n\
+             Content-Length: {}\r\n\r\n{order}",
+            order.len()
+        )
+        .into_bytes(),
+        hachi_http::Response::json(200, order.to_owned()).to_bytes(),
+    ]
+}
+
 /// A floor and a wall as a submap.
 fn corner() -> Submap {
     let mut builder = SubmapBuilder::default();
@@ -469,6 +484,7 @@ fn main() -> Result<()> {
                 .map(|kind| with_switches(kind, leg_numbers()))
                 .collect(),
         ),
+        ("http_request", http_request()),
         ("onnx_file", onnx_file()),
         (
             "mot_text",
