@@ -318,7 +318,8 @@ fn people_codec() -> Vec<Vec<u8>> {
 fn http_request() -> Vec<Vec<u8>> {
     let order = "{\"at\":[320,180]}";
     vec![
-        b"GET /people HTTP/1.1\r\nHost: localhost:9470\r\nOrigin: http://localhost:9470\r\n\r\n".to_vec(),
+        b"GET /people HTTP/1.1\r\nHost: localhost:9470\r\nOrigin: http://localhost:9470\r\n\r\n"
+            .to_vec(),
         format!(
             "POST /people/pick HTTP/1.1\r\nHost: [::1]:9470\r\nContent-Type: application/json\r\n\
              Content-Length: {}\r\n\r\n{order}",
@@ -424,7 +425,7 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 23] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 24] = [
         ("canbus", canbus()),
         ("imu", imu()),
         ("realsense", realsense()),

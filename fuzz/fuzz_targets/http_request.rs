@@ -19,7 +19,10 @@ fuzz_target!(|bytes: &[u8]| {
             }
             if guard::check(&request).is_ok() {
                 assert!(request.host.is_some());
-                let kind = request.content_type.unwrap_or_default().to_ascii_lowercase();
+                let kind = request
+                    .content_type
+                    .unwrap_or_default()
+                    .to_ascii_lowercase();
                 assert!(request.method == Method::Get || kind.starts_with("application/json"));
             }
         }
