@@ -54,10 +54,16 @@ struct Rig {
 impl Rig {
     /// One before whose camera these people are about; it looks for them if it has a store.
     fn new(people: Vec<Person>, store: Option<&Path>) -> Self {
-        Self::patient(people, store, Duration::from_secs(60))
+        Self::with(people, store, Duration::from_secs(60), None)
     }
 
-    fn patient(people: Vec<Person>, store: Option<&Path>, patience: Duration) -> Self {
+    /// One that waits so long for an order, and has so many bytes of room in its store.
+    fn with(
+        people: Vec<Person>,
+        store: Option<&Path>,
+        patience: Duration,
+        room: Option<u64>,
+    ) -> Self {
         let mut settings = Settings::load(Some("b1"), None).unwrap();
         settings.motion = MotionInput::Odometry;
         settings.people.enabled = store.is_some();
@@ -67,6 +73,10 @@ impl Rig {
         // No camera has this number: the pictures come from the renderer.
         settings.camera.serial = Some("none".to_owned());
         let eyes = eyes::of_this_computer(&settings, SystemClock::new());
+        if let (Some(eyes), Some(room)) = (&eyes, room) {
+            let kept = eyes.people.as_ref().and_then(|people| people.kept.as_ref());
+            kept.unwrap().store.set_quota(room).unwrap();
+        }
 
         let mut world = SimulationConfig::preset(Preset::Office, 2, f64::MAX);
         world.base_from_lidar = settings.base_from_lidar.pose();
@@ -362,9 +372,14 @@ fn whoever_is_enrolled_in_front_of_the_robot_is_known_by_name_when_they_come_bac
     let (_folder, store) = store();
     let mut rig = Rig::new(vec![anna(), berta([5.5, 1.2], 19.5)], Some(&store));
     rig.pass(2.5);
+    let (_, picked) = rig.post("/people/pick", &rig.place_of(1));
     let enrolled = rig.command(&["enrol", "Anna", "--live", "--json"]).json();
     assert_eq!(enrolled["images_used"], 30);
     let number = &enrolled["person"];
+    assert_eq!(
+        number, &picked["person"],
+        "who was picked keeps their number"
+    );
     let people = rig.people();
     assert_eq!(people["enrolment"]["stage"], "done");
     assert_eq!(people["known"][0]["name"], "Anna");
@@ -411,7 +426,8 @@ fn an_enrolment_is_refused_cancelled_and_fails_without_a_trace() {
     let (_folder, store) = store();
     let mut person = somebody();
     person.visits[0].path = vec![[4.0, 0.5]];
-    let mut rig = Rig::new(vec![person, berta([4.0, -0.5], 4.0)], Some(&store));
+    let people = vec![person, berta([4.0, -0.5], 16.0)];
+    let mut rig = Rig::with(people, Some(&store), Duration::from_secs(60), Some(1));
     let anna = json!({ "name": "Anna" });
     let (status, refused) = rig.post("/people/enrol", &json!({ "name": " " }));
     assert_eq!(status, 422, "{refused}");
@@ -434,7 +450,15 @@ fn an_enrolment_is_refused_cancelled_and_fails_without_a_trace() {
     assert_eq!((status, &cancelled["cancelled"]), (200, &json!(true)));
     let (_, cancelled) = rig.post("/people/cancel", &json!({}));
     assert_eq!(cancelled["cancelled"], false);
-    rig.pass_until(6.0);
+    // All looks are taken, and there is no room for them.
+    let failed = rig.command(&["enrol", "Anna", "--live"]);
+    let line = failed.failure();
+    assert!(
+        line.contains("no room to write") && line.contains("free some space"),
+        "{line}"
+    );
+    assert_eq!(rig.people()["known"], json!([]));
+    rig.pass_until(18.0);
     let refused = rig.command(&["enrol", "Anna", "--live"]);
     assert!(
         refused.failure().contains("2 people stand in front"),
@@ -501,7 +525,7 @@ fn what_is_no_order_or_comes_from_elsewhere_is_refused_with_what_to_do() {
 fn orders_are_checked_and_rated_and_one_that_no_picture_carries_out_is_withdrawn() {
     let (_folder, store) = store();
     let person = berta([3.5, 0.0], 0.0);
-    let mut rig = Rig::patient(vec![person], Some(&store), Duration::from_millis(300));
+    let mut rig = Rig::with(vec![person], Some(&store), Duration::from_millis(300), None);
     let address = rig.address;
     for (path, body, status) in [
         ("/people/pick", "{\"track\": 3", 400),

@@ -25,8 +25,8 @@ use tracing::info;
 use crate::service::enrolment::{self, Stage};
 use crate::service::keeper::Names;
 use crate::service::orders::{Answer, NoAnswer, NotBegun, Order};
+use crate::service::people::{NoPeople, PeopleDesk};
 use crate::service::view::View;
-use crate::service::wiring::{NoPeople, PeopleDesk};
 
 /// Where it is told.
 pub const PATH: &str = "/people";
