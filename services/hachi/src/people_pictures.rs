@@ -201,7 +201,7 @@ mod tests {
         let mut identifier = Identifier::new(IdentifierConfig::default());
         let model = AppearanceModel::first(&[1.0, 0.0]).unwrap();
         identifier.enrol(model, Some(tracks[1].id));
-        identifier.step(tracks, None, 0.1);
+        identifier.step(tracks, None, None, 0.1);
         let statuses: Vec<_> = identifier.statuses().copied().collect();
         let wall = blank([100, 100], grey(100));
         let image = wall.view().unwrap();

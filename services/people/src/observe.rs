@@ -36,6 +36,8 @@ pub struct Observation<'a> {
     pub detections: &'a [Detection],
     /// What they look like, in the same order; zeros for those who are not sure.
     pub features: Option<Features<'a>>,
+    /// Columns of the image; `None` where there is none (another detector's boxes).
+    pub columns: Option<usize>,
 }
 
 impl Observer {
@@ -84,6 +86,7 @@ impl Observer {
             return Ok(Observation {
                 detections: &self.detections,
                 features: None,
+                columns: Some(image.width()),
             });
         };
         // Surest first, so that whoever has a feature stands before whoever has none.
@@ -106,6 +109,7 @@ impl Observer {
                 values: &self.features,
                 same_person_distance: appearance.same_person_distance(),
             }),
+            columns: Some(image.width()),
         })
     }
 }

@@ -80,8 +80,9 @@ impl Watch {
             features: observed.features,
         });
         let picked = self.enrol_the_picked(observed.features, dt_s);
+        let (tracks, columns) = (self.tracker.tracks(), observed.columns);
         self.identifier
-            .step(self.tracker.tracks(), observed.features, dt_s);
+            .step(tracks, observed.features, columns, dt_s);
         picked
     }
 
@@ -153,6 +154,7 @@ mod tests {
                 values: &values,
                 same_person_distance: 0.3,
             }),
+            columns: None,
         };
         watch.step(&observed, 0.1)
     }

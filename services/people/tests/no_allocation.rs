@@ -77,7 +77,7 @@ fn main() {
                 identifier.enrol(model, Some(track.id));
             }
         }
-        identifier.step(tracker.tracks(), Some(features), 1.0 / 30.0);
+        identifier.step(tracker.tracks(), Some(features), Some(1920), 1.0 / 30.0);
         if frame >= CYCLES {
             allocated += allocations() - before;
             times_ms.push(begun.elapsed().as_secs_f64() * 1e3);

@@ -338,6 +338,7 @@ mod tests {
                         values: &values,
                         same_person_distance: 0.4,
                     }),
+                    columns: None,
                 };
                 self.watch.step(&observed, 0.1);
                 self.looked.keep(&observed);

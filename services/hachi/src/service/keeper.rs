@@ -442,6 +442,7 @@ mod tests {
                         values: &looks,
                         same_person_distance: 0.4,
                     }),
+                    columns: None,
                 };
                 self.watch.step(&seen, 0.2);
                 self.acquaintances.tell(&self.watch, &self.roster, self.now);

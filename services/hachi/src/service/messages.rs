@@ -101,6 +101,7 @@ impl Looked {
                 values: &self.features,
                 same_person_distance: self.same_person_distance,
             }),
+            columns: (self.picture.width > 0).then_some(self.picture.width),
         }
     }
 }

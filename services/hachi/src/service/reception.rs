@@ -273,6 +273,7 @@ mod tests {
                         values: &LOOKS,
                         same_person_distance: 0.4,
                     }),
+                    columns: None,
                 };
                 self.watch.step(&observed, 0.1);
                 self.looked.keep(&observed);

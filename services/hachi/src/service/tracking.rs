@@ -183,6 +183,7 @@ mod tests {
                     values: &[1.0, 0.1].repeat(lefts.len()),
                     same_person_distance: 0.3,
                 }),
+                columns: None,
             });
             self.looked.send(looked);
             self.tracking.run(self.now);

@@ -9,7 +9,8 @@
 //! them is a distractor and stays one until their track ends (the blacklist).
 //!
 //! And with what trackers do to it. They hand a track on where people cross: whoever comes out of cover,
-//! or from beside somebody, has to look like the person, and nothing is learnt before they do. Where
+//! or from beside somebody, or is cut off by the picture's edge, has to look like the person, and nothing
+//! is learnt before they do. Where
 //! looks can't tell the two apart, nobody is followed until the user points at somebody again, or the
 //! other one has been gone for five minutes. A single look is often wrong: it takes the mean of some to
 //! find the person, and the more, the nearer it has to be.
@@ -145,15 +146,22 @@ impl Identifier {
         self.people.iter().map(|person| &person.status)
     }
 
-    /// Takes in the tracks of one frame, and the features of its detections.
-    pub fn step(&mut self, tracks: &[Track], features: Option<Features<'_>>, dt_s: f64) {
+    /// Takes in the tracks of one frame, the features of its detections, and how wide the picture is,
+    /// where there is one.
+    pub fn step(
+        &mut self,
+        tracks: &[Track],
+        features: Option<Features<'_>>,
+        columns: Option<usize>,
+        dt_s: f64,
+    ) {
         let dt_s = if dt_s.is_finite() { dt_s.max(0.0) } else { 0.0 };
         let look = |track: &Track| features?.get(track.detection?);
         for person in &mut self.people {
             person.begin(tracks, look, dt_s);
         }
         for person in &mut self.people {
-            person.stay(tracks, look, self.config.adapts, dt_s);
+            person.stay(tracks, look, self.config.adapts, (dt_s, columns));
         }
         self.search(tracks, look);
         for person in &mut self.people {
@@ -202,6 +210,7 @@ mod tests {
     struct World {
         tracker: Tracker,
         identifier: Identifier,
+        columns: Option<usize>,
     }
 
     impl World {
@@ -209,6 +218,7 @@ mod tests {
             Self {
                 tracker: Tracker::new(TrackerConfig::default()),
                 identifier: Identifier::new(IdentifierConfig::default()),
+                columns: None,
             }
         }
 
@@ -233,7 +243,7 @@ mod tests {
                 same_person_distance: 0.5,
             };
             self.identifier
-                .step(self.tracker.tracks(), Some(features), DT_S);
+                .step(self.tracker.tracks(), Some(features), self.columns, DT_S);
         }
 
         fn track_at(&self, left: f64) -> Option<u64> {
@@ -368,6 +378,31 @@ mod tests {
         world.show(&[(0.0, BLUE), (300.0, BLUE)]);
         assert_eq!(world.status().condition, Condition::Unsure);
         assert!(world.status().confidence < 0.5);
+    }
+
+    #[test]
+    fn whoever_enters_where_the_person_leaves_the_picture_is_not_followed() {
+        let mut world = World::new();
+        world.columns = Some(700);
+        for _ in 0..5 {
+            world.show(&[(450.0, RED)]);
+        }
+        let track = world.track_at(450.0);
+        world
+            .identifier
+            .enrol(AppearanceModel::first(&RED).unwrap(), track);
+        for k in 0..22 {
+            world.show(&[(450.0 + 10.0 * f64::from(k), RED)]);
+        }
+        assert_eq!(world.status().condition, Condition::Seen);
+        // At the right edge; the next one in is on the person's track.
+        for k in 0..22 {
+            world.show(&[(660.0 - 10.0 * f64::from(k), BLUE)]);
+            assert_ne!(world.status().unseen_s, 0.0, "{k}");
+        }
+        assert_eq!(world.track_at(450.0), track);
+        let model = world.identifier.model(PersonId(1)).unwrap();
+        assert!(model.distance(&BLUE) > model.threshold());
     }
 
     #[test]

@@ -16,6 +16,8 @@ const APART_S: f64 = 0.5;
 const TOUCHING: f64 = 0.2;
 /// Boxes whose heights differ by a larger factor are not taken for each other.
 const AS_LARGE: f64 = 1.5;
+/// A box that comes so near to the picture's edge ends there, share of its width.
+const EDGE: f64 = 0.01;
 /// Somebody whose mean distance is more thresholds than this does not look like the person.
 const UNLIKE: f64 = 1.3;
 /// Looks beside the person that are averaged: three seconds.
@@ -141,6 +143,13 @@ pub(super) fn touch(a: &Track, b: &Track) -> bool {
 pub(super) fn is_as_large(a: &Track, b: &Track) -> bool {
     let heights = a.bounding_box().height / b.bounding_box().height;
     (1.0 / AS_LARGE..AS_LARGE).contains(&heights)
+}
+
+/// Whether a track's box ends where the picture does, on the left or on the right.
+pub(super) fn is_cut_off(track: &Track, columns: usize) -> bool {
+    let (found, columns) = (track.bounding_box(), columns as f64);
+    let margin = EDGE * columns;
+    found.left < margin || found.right() > columns - margin
 }
 
 /// What two boxes share, of the smaller one.

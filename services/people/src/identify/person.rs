@@ -6,7 +6,7 @@
 
 use super::AppearanceModel;
 use super::carpe::{Condition, Status};
-use super::others::{Mean, Others, is_as_large, touch};
+use super::others::{Mean, Others, is_as_large, is_cut_off, touch};
 use crate::track::Track;
 
 /// A person is said to be `FOUND` for so long, seconds.
@@ -102,7 +102,7 @@ impl Person {
         tracks: &[Track],
         look: impl Fn(&Track) -> Option<&'a [f32]> + Copy,
         adapts: bool,
-        dt_s: f64,
+        (dt_s, columns): (f64, Option<usize>),
     ) {
         let own = tracks
             .iter()
@@ -113,7 +113,8 @@ impl Person {
         self.notice_doubles(own, others(), feature.is_some());
         let share = self.share(feature);
         let hidden = share.is_none() && self.hidden_s > MOST_HIDDEN_S;
-        if !own.is_seen() || hidden || self.is_handed_on(own, share, others(), look) {
+        let edge = columns.is_some_and(|columns| is_cut_off(own, columns));
+        if !own.is_seen() || hidden || self.is_handed_on(own, edge, share, others(), look) {
             return;
         }
         let was_unlike = self.status.confidence < UNLIKE_CONFIDENCE;
@@ -132,10 +133,12 @@ impl Person {
     }
 
     /// Whether the track shows somebody else by now, as far as looks say. They are asked where the two
-    /// may have been taken for each other, until enough of them vouch for the person.
+    /// may have been taken for each other, at the picture's `edge` too, where one leaves and another
+    /// enters, until enough of them vouch for the person.
     fn is_handed_on<'a, 'b>(
         &mut self,
         own: &Track,
+        edge: bool,
         share: Option<f64>,
         mut others: impl Iterator<Item = &'b Track> + Clone,
         look: impl Fn(&Track) -> Option<&'a [f32]>,
@@ -144,7 +147,8 @@ impl Person {
             self.others.was_apart(other.id) && touch(own, other) && is_as_large(own, other)
         };
         let touched = others.clone().any(alongside);
-        if touched || self.hidden_s > HIDDEN_S {
+        let replaced = edge && share.is_some_and(|share| share > 1.0);
+        if touched || replaced || self.hidden_s > HIDDEN_S {
             self.doubt.get_or_insert_default();
         }
         let (Some(mut doubt), Some(share)) = (self.doubt, share) else {
