@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use hachi_behaviour::{Cause, Causes, GuardedBase, Obstacles, PlaceEstimate, Sight, Verdict};
+use hachi_behaviour::{Cause, GuardedBase, Obstacles, PlaceEstimate, Sight, Verdict};
 use hachi_hal::{BaseCommand, Stamp, StopSample, Watchdog};
 use hachi_runtime::{Halt, Progress, Receiver, Sender, SoftWatchdog, Work};
 use hachi_unitree::BodySample;
@@ -10,6 +10,7 @@ use hachi_unitree::device::RobotLink;
 use tracing::{info, warn};
 
 use super::body::UnitreeBody;
+use super::herald::Herald;
 use super::signs::SharedSigns;
 
 /// States taken in at one run: a B1 sends two in 5 ms; after a pause they come in a bunch.
@@ -45,8 +46,8 @@ pub struct BaseCommandTask<L> {
     pub watchdog: SoftWatchdog,
     /// What the task leaves for whoever asks.
     pub signs: SharedSigns,
-    /// Why the robot stood when it was last said.
-    pub said: Causes,
+    /// What was said of why the robot stands.
+    pub herald: Herald,
     /// Whether the last step failed at the base.
     pub failing: bool,
     /// Whether the link to the robot failed when it was last listened to.
@@ -75,7 +76,7 @@ impl<L: RobotLink + Send> Work for BaseCommandTask<L> {
                 unmoved.verdict
             }
         };
-        self.say(&verdict);
+        self.say(now, &verdict);
         // Feeding can't fail: its error has no value.
         let Ok(()) = self.watchdog.feed(now);
         Progress::Done
@@ -132,21 +133,21 @@ impl<L: RobotLink> BaseCommandTask<L> {
     }
 
     /// Says what changed. That nobody wishes anything is no news: it is how a robot rests.
-    fn say(&mut self, verdict: &Verdict) {
+    fn say(&mut self, now: Stamp, verdict: &Verdict) {
         self.signs.set_causes(verdict.causes);
         if verdict.limited {
             self.signs.limited.fetch_add(1, Ordering::Relaxed);
         }
-        for cause in verdict.causes.without(self.said).iter() {
+        let news = self.herald.hear(now, verdict.causes);
+        for cause in news.come.iter() {
             match cause {
                 Cause::NoWish | Cause::Obstacle => info!("{}", cause.line()),
                 _ => warn!("{}", cause.line()),
             }
         }
-        if verdict.causes.is_empty() && !self.said.is_empty() {
+        if news.over {
             info!("going on");
         }
-        self.said = verdict.causes;
     }
 }
 

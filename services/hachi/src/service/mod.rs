@@ -39,6 +39,7 @@ pub mod emergency_stop;
 pub mod enrolment;
 pub mod eyes;
 pub mod filter;
+pub mod herald;
 pub mod imu;
 pub mod keeper;
 pub mod legs;

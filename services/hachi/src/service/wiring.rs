@@ -15,7 +15,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Obstacles, Patrol, SafetyGate, Sight};
+use hachi_behaviour::{GuardedBase, ObstacleFinder, Obstacles, Patrol, SafetyGate, Sight};
 use hachi_bridge::message::Sensor;
 use hachi_cloud::Filters;
 use hachi_hal::{LidarScans, PacketSource, Pose, Rotation, Stamp};
@@ -37,6 +37,7 @@ use super::camera::PictureSource;
 use super::crew::Crew;
 use super::emergency_stop::{EmergencyStopTask, StopBus};
 use super::filter::Filter;
+use super::herald::Herald;
 use super::imu::{ImuDevice, ImuTask};
 use super::keeper::Kept as KeptPeople;
 use super::legs::Legs;
@@ -215,7 +216,7 @@ where
         halt: table.halt().clone(),
         watchdog: watchdog.clone(),
         signs: Arc::clone(&signs),
-        said: Causes::default(),
+        herald: Herald::default(),
         failing: false,
         deaf: false,
     };
