@@ -314,6 +314,22 @@ fn people_codec() -> Vec<Vec<u8>> {
     vec![encode_record(&record), encode_model(&network, &model)]
 }
 
+/// What a browser asks, what a program orders, and the answer to it.
+fn http_request() -> Vec<Vec<u8>> {
+    let order = "{\"at\":[320,180]}";
+    vec![
+        b"GET /people HTTP/1.1\r\nHost: localhost:9470\r\nOrigin: http://localhost:9470\r\n\r\n"
+            .to_vec(),
+        format!(
+            "POST /people/pick HTTP/1.1\r\nHost: [::1]:9470\r\nContent-Type: application/json\r\n\
+             Content-Length: {}\r\n\r\n{order}",
+            order.len()
+        )
+        .into_bytes(),
+        hachi_http::Response::json(200, order.to_owned()).to_bytes(),
+    ]
+}
+
 /// A floor and a wall as a submap.
 fn corner() -> Submap {
     let mut builder = SubmapBuilder::default();
@@ -409,7 +425,7 @@ fn main() -> Result<()> {
     let [b1_high, b1_low] = unitree_states(&unitree::Layout::B1);
     let [go1_walk, go1_idle] = unitree_commands(&unitree::Layout::GO1);
     let [b1_walk, _] = unitree_commands(&unitree::Layout::B1);
-    let seeds: [(&str, Vec<Vec<u8>>); 23] = [
+    let seeds: [(&str, Vec<Vec<u8>>); 24] = [
         ("canbus", canbus()),
         ("imu", imu()),
         ("realsense", realsense()),
@@ -469,6 +485,7 @@ fn main() -> Result<()> {
                 .map(|kind| with_switches(kind, leg_numbers()))
                 .collect(),
         ),
+        ("http_request", http_request()),
         ("onnx_file", onnx_file()),
         (
             "mot_text",

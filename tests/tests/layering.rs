@@ -191,6 +191,12 @@ const LAYERS: &[Layer] = &[
         tests_see: &[],
         because: "who runs tasks does not know what they compute",
     },
+    Layer {
+        name: "hachi-http",
+        sees: &[],
+        tests_see: &[],
+        because: "a request is bytes, whatever it asks for",
+    },
 ];
 
 /// The only ones that see both ends: the program, and the tests of the whole.

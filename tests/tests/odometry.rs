@@ -5,6 +5,7 @@ use hachi_cloud::{FilterConfig, Filters, ScanFrames};
 use hachi_hal::{OdometrySample, Pose, Stamp};
 use hachi_odometry::{Condition, Doubt, Estimate, Odometry, OdometryConfig, ScanInput};
 use hachi_tests::{SimulatedScans, error};
+use hachi_world::trajectory::{Gait, TrajectoryBuilder};
 use hachi_world::{Preset, SimulationConfig};
 
 /// What a walk through a simulated building came to.
@@ -71,6 +72,42 @@ fn a_trotting_robot_is_followed_to_centimetres() {
     let walk = Walk::run(&world, OdometryConfig::default(), false);
     assert!(walk.worst_m() < 0.15, "{}", walk.worst_m());
     assert!(walk.estimates.iter().all(|e| e.condition.is_ok()));
+}
+
+#[test]
+fn a_robot_that_stands_in_a_doorway_stays_where_it_is() {
+    let mut world = SimulationConfig::preset(Preset::Office, 1, 32.0);
+    // The first place that it turns off to is inside a room.
+    let [before, inside] = [1, 2].map(|i| world.trajectory.places()[i]);
+    let way = [0, 1].map(|a| inside[a] - before[a]);
+    let door = [0, 1].map(|a| before[a] + 1.6 * way[a] / way[0].hypot(way[1]));
+    let start = [before[0] - 3.0, before[1]];
+    let trajectory = TrajectoryBuilder::new(start, 0.0, Gait::quadruped())
+        .walk(&[before, door])
+        .stand(25.0)
+        .walk(&[before, start])
+        .turn_to(0.0)
+        .build(world.scene.floor().clone());
+    world.trajectory = trajectory.unwrap().into();
+    let walk = Walk::run(&world, OdometryConfig::default(), false);
+
+    let last = walk.truth.last().unwrap();
+    let walks = |t: &&Pose| t.inv_mul(last).translation.vector.norm() > 1e-3;
+    let stops = walk.truth.iter().take_while(walks).count();
+    let stands = &walk.estimates[stops..];
+    assert!(stands.len() > 200, "{stops}");
+    let still = |e: &Estimate| stands[0].odom_from_lidar.inv_mul(&e.odom_from_lidar);
+    let (mut moved_m, mut turned) = (0.0, 0.0);
+    for motion in stands.iter().map(still) {
+        moved_m = f64::max(moved_m, motion.translation.vector.norm());
+        turned = f64::max(turned, motion.rotation.angle());
+    }
+    eprintln!(
+        "stood for {} scans: moved {moved_m:.4} m, turned {turned:.4} rad",
+        stands.len()
+    );
+    assert!(moved_m < 0.015, "{moved_m} m");
+    assert!(turned < 0.01, "{turned} rad");
 }
 
 #[test]

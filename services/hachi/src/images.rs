@@ -23,6 +23,9 @@ const MAX_PIXELS: usize = 100_000_000;
 /// Larger files are refused.
 const MAX_FILE_BYTES: u64 = 256 << 20;
 
+/// Pictures of people are kept at most so high: twice what networks look at.
+const MOST_HIGH: usize = 512;
+
 /// RGB pixels, 8 bits each.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rgb {
@@ -45,13 +48,22 @@ impl Rgb {
 
     /// What lies in a box, as far as it lies in the image; `None` if nothing does.
     pub fn cut(&self, bounding_box: &BoundingBox) -> Option<Self> {
+        Self::cut_from((self.width, self.height), &self.pixels, bounding_box)
+    }
+
+    /// The same of an image of so many columns and rows.
+    pub fn cut_from(
+        (columns, rows): (usize, usize),
+        pixels: &[u8],
+        bounding_box: &BoundingBox,
+    ) -> Option<Self> {
         let b = bounding_box;
         // Casts take what is no number, and what is below nought, for nought.
         let (left, top) = (b.left.floor() as usize, b.top.floor() as usize);
-        let right = ((b.left + b.width).ceil() as usize).min(self.width);
-        let bottom = ((b.top + b.height).ceil() as usize).min(self.height);
+        let right = ((b.left + b.width).ceil() as usize).min(columns);
+        let bottom = ((b.top + b.height).ceil() as usize).min(rows);
         let (width, height) = (right.checked_sub(left)?, bottom.checked_sub(top)?);
-        let row = |y: usize| &self.pixels[3 * (y * self.width + left)..][..3 * width];
+        let row = |y: usize| &pixels[3 * (y * columns + left)..][..3 * width];
         (width > 0 && height > 0).then(|| Self {
             width,
             height,
@@ -95,6 +107,17 @@ impl Rgb {
         writer.finish()?;
         Ok(bytes)
     }
+}
+
+/// A picture of a person as it is kept: a PNG file of no more pixels than needed.
+///
+/// # Errors
+/// It has no pixel.
+pub fn kept(mut crop: Rgb) -> Result<Vec<u8>, String> {
+    while crop.height.max(crop.width) > MOST_HIGH && crop.height.min(crop.width) > 1 {
+        crop = crop.shrunk(2);
+    }
+    crop.to_png().map_err(|error| error.to_string())
 }
 
 /// One image of a folder.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use crate::exit::Failure;
 
@@ -37,6 +38,16 @@ impl Cancelled {
     /// Whether to stop at the next good place.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// Waits for so many tenths of a second, or until it is raised.
+    pub fn pause(&self, tenths: u32) {
+        for _ in 0..tenths {
+            if self.is_cancelled() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
     }
 
     /// Asks for a stop, as Ctrl-C does.

@@ -15,6 +15,7 @@
 //! | [`recorder`] | what sensors sent, as a file |
 //! | [`record`] | what a run has done so far |
 //! | [`service`] | the service on a robot, task by task |
+//! | [`service_link`] | a running service, as the commands ask it |
 //! | [`config`] | settings |
 //! | [`can`], [`imu`] | CAN interfaces of this machine, and the bus of its inertial sensor |
 //! | [`map_builder`], [`map_picture`] | the map that people look at |
@@ -59,6 +60,7 @@ pub mod results;
 pub mod saved_maps;
 pub mod saved_people;
 pub mod service;
+pub mod service_link;
 pub mod slam_stage;
 pub mod task_table;
 

@@ -6,7 +6,7 @@ use hachi_odometry::{Condition, Estimate};
 use hachi_trajectory::Trajectory;
 use tracing::{info, warn};
 
-use crate::report::{ConditionCounts, Report, peak_rss_mb};
+use crate::report::{ConditionCounts, GuessCounts, Report, peak_rss_mb};
 
 /// The record.
 #[derive(Debug)]
@@ -16,6 +16,7 @@ pub struct RunRecord {
     keeps_path: bool,
     removed: RemovalCounts,
     conditions: ConditionCounts,
+    guesses: GuessCounts,
     condition: Condition,
     intensity: Option<IntensityUse>,
     scans: u64,
@@ -30,6 +31,7 @@ impl RunRecord {
             keeps_path,
             removed: RemovalCounts::of(&[]),
             conditions: ConditionCounts::default(),
+            guesses: GuessCounts::default(),
             condition: Condition::Ok,
             intensity: None,
             scans: 0,
@@ -46,6 +48,7 @@ impl RunRecord {
         self.points += points as u64;
         self.removed += filtered.counts;
         self.conditions.count(&estimate.condition);
+        self.guesses.count(estimate.guess);
         if estimate.condition != self.condition {
             info!(scan = self.scans - 1, "{}", estimate.condition);
             self.condition = estimate.condition;
@@ -84,6 +87,7 @@ impl RunRecord {
             threads: rayon::current_num_threads(),
             peak_rss_mb: peak_rss_mb(),
             conditions: self.conditions,
+            guesses: self.guesses,
             ..Report::default()
         };
         for (reason, count) in self.removed.iter() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use hachi_odometry::Condition;
+use hachi_odometry::{Condition, Guess};
 use hachi_runtime::{Histogram, Summary};
 use hachi_slam::SlamCondition;
 use serde::Serialize;
@@ -52,6 +52,8 @@ pub struct Report {
     pub dropped: BTreeMap<String, u64>,
     /// How far the poses can be trusted.
     pub conditions: ConditionCounts,
+    /// What the scans were expected by.
+    pub guesses: GuessCounts,
     /// How far their places on the map could be trusted, with SLAM.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map_conditions: Option<MapConditionCounts>,
@@ -88,6 +90,29 @@ impl ConditionCounts {
             Condition::Ok => self.ok += 1,
             Condition::Degraded(_) => self.degraded += 1,
             Condition::Lost(_) => self.lost += 1,
+        }
+    }
+}
+
+/// What the scans were expected by, besides the scans before them: how many by each. Legs or a
+/// gyroscope that were given and did not reach the scan's end count as speed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct GuessCounts {
+    /// The speed of the scans before.
+    pub speed: u64,
+    /// A gyroscope.
+    pub gyroscope: u64,
+    /// Legs, wheels or another odometry.
+    pub odometry: u64,
+}
+
+impl GuessCounts {
+    /// One more scan.
+    pub fn count(&mut self, guess: Guess) {
+        match guess {
+            Guess::Speed => self.speed += 1,
+            Guess::Gyroscope => self.gyroscope += 1,
+            Guess::Odometry => self.odometry += 1,
         }
     }
 }

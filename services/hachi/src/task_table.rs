@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::service::web::Status;
 
 /// To the upper left, and everything below it gone.
-const CLEAR: &str = "\x1b[H\x1b[J";
+pub const CLEAR: &str = "\x1b[H\x1b[J";
 
 /// The table in place of what is on the screen.
 pub fn on_screen(status: &Status) -> String {

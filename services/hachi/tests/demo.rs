@@ -27,6 +27,8 @@ fn eight_seconds_in_the_simulated_office_stay_on_the_truth() {
     );
     assert!(report["ate_rmse_m"].as_f64().unwrap() < 0.08, "{report}");
     assert_eq!(report["conditions"]["lost"], 0, "{report}");
+    // Its legs reach the end of every scan but the first, which nothing led to.
+    assert_eq!(report["guesses"]["speed"], 1, "{report}");
     // A map that begins here is trusted from its first scan on.
     assert_eq!(report["map_conditions"]["ok"], report["conditions"]["ok"]);
 
@@ -189,6 +191,11 @@ fn one_thread_and_two_give_the_same_bytes() {
     );
     assert!(
         report["true_path_length_m"].as_f64().unwrap() > 1.0,
+        "{report}"
+    );
+    // Fifty new states a second reach the ends of scans too.
+    assert!(
+        report["guesses"]["speed"].as_u64().unwrap() <= 2,
         "{report}"
     );
     for name in names(&one).iter().filter(|name| *name != "report.json") {

@@ -21,4 +21,4 @@ mod timing;
 
 pub use condition::{Condition, Doubt};
 pub use config::OdometryConfig;
-pub use odometry::{Estimate, Odometry, ScanInput};
+pub use odometry::{Estimate, Guess, Odometry, ScanInput};

@@ -15,6 +15,10 @@ const MOST_GAP_NS: i64 = 50_000_000;
 /// scan is placed, as it is from a gyroscope that measures a hundred times a second.
 const MOST_HELD_NS: i64 = 10_000_000;
 
+/// And the speed of external odometry for this long: a Go1's legs say something new fifty times a
+/// second.
+const MOST_CARRIED_NS: i64 = 25_000_000;
+
 /// Smallest error an increment is believed to have, metres and radians.
 const LEAST_SIGMA: f64 = 1e-3;
 
@@ -109,9 +113,9 @@ pub fn from_odometry(
     out: &mut Vec<Increment>,
 ) {
     out.clear();
-    let pose_at = |i: usize| interpolate(samples, knots(i)).map(|p| p * config.base_from_lidar);
+    let lidar_at = |i: usize| pose_at(samples, knots(i)).map(|p| p * config.base_from_lidar);
     for i in 0..intervals {
-        let (Some(from), Some(to)) = (pose_at(i), pose_at(i + 1)) else {
+        let (Some(from), Some(to)) = (lidar_at(i), lidar_at(i + 1)) else {
             out.clear();
             return;
         };
@@ -125,13 +129,30 @@ pub fn from_odometry(
     }
 }
 
-fn interpolate(samples: &[OdometrySample], at: Stamp) -> Option<Pose> {
+/// The pose at a moment: between two samples, or shortly after the last one at the speed it had.
+fn pose_at(samples: &[OdometrySample], at: Stamp) -> Option<Pose> {
     let after = samples.partition_point(|s| s.stamp < at);
-    let next = samples.get(after)?;
+    let Some(next) = samples.get(after) else {
+        return carried_on(samples, at);
+    };
     if next.stamp == at {
         return Some(next.odom_from_base);
     }
     let before = samples.get(after.checked_sub(1)?)?;
+    between(before, next, at)
+}
+
+/// The pose shortly after the last sample, which is the newest there is while a scan is placed.
+fn carried_on(samples: &[OdometrySample], at: Stamp) -> Option<Pose> {
+    let last = samples.last().filter(|s| at - s.stamp <= MOST_CARRIED_NS)?;
+    // Over as long a time as the pose is carried at most: samples 2 ms apart tell no speed.
+    let early = samples.partition_point(|s| last.stamp - s.stamp > MOST_CARRIED_NS);
+    let before = samples.get(early.checked_sub(1)?)?;
+    between(before, last, at)
+}
+
+/// On the straight way through two samples, or beyond the later one.
+fn between(before: &OdometrySample, next: &OdometrySample, at: Stamp) -> Option<Pose> {
     let gap = next.stamp - before.stamp;
     if gap > MOST_GAP_NS {
         return None;
@@ -203,6 +224,34 @@ mod tests {
             );
         }
         assert!((bias.rad_per_s.z - 0.02).abs() < 1e-3, "{bias:?}");
+    }
+
+    #[test]
+    fn odometry_that_ends_just_before_the_scan_is_carried_on_at_its_speed() {
+        // 500 a second, 2 m/s along x; the scan ends at 1.1 s.
+        let samples = |last_ms: i64| -> Vec<_> {
+            (940..=last_ms)
+                .step_by(2)
+                .map(|ms| OdometrySample {
+                    stamp: Stamp::from_nanos(ms * 1_000_000),
+                    odom_from_base: Pose::translation(2e-3 * ms as f64, 0.0, 0.0),
+                })
+                .collect()
+        };
+        let config = OdometryConfig::default();
+        let mut out = Vec::new();
+        for last_ms in [1100, 1098, 1080] {
+            from_odometry(&samples(last_ms), knot, 4, &config, &mut out);
+            assert_eq!(out.len(), 4, "the last sample at {last_ms} ms");
+            for increment in &out {
+                let shift = increment.motion.translation.vector;
+                assert!((shift - Vector3::new(0.05, 0.0, 0.0)).norm() < 1e-9);
+            }
+        }
+        from_odometry(&samples(1072), knot, 4, &config, &mut out);
+        assert!(out.is_empty(), "28 ms are not carried");
+        from_odometry(&samples(1098)[79..], knot, 4, &config, &mut out);
+        assert!(out.is_empty(), "one sample has no speed");
     }
 
     #[test]

@@ -40,6 +40,15 @@ const SETTLED: usize = 3;
 /// can tell apart.
 const REMEMBERED_POINTS: usize = 40_000;
 
+/// Nothing new is seen from less far away than this, and while the robot stands scans become the map
+/// only so often: cells beside it are filled by one scan, and a map made of the last few scans moves
+/// along with whatever pulls on them. A robot that stood in a doorway for half a minute drifted by
+/// 10 cm. A map's first scans are always news.
+const FIRST_SCANS: u32 = 12;
+const NEWS_M: f64 = 0.04;
+const NEWS_RAD: f64 = 0.02;
+const NEWS_NS: i64 = 2_000_000_000;
+
 /// The map's origin follows when the robot is this far from it: single precision keeps 0.03 mm.
 const ORIGIN_RANGE_M: f64 = 500.0;
 
@@ -72,6 +81,18 @@ impl<'a> ScanInput<'a> {
     }
 }
 
+/// What a scan was expected by, besides the scans before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Guess {
+    /// The speed of the scans before it.
+    #[default]
+    Speed,
+    /// Turning rates that span it.
+    Gyroscope,
+    /// External odometry that spans it.
+    Odometry,
+}
+
 /// Where the sensor was at a scan's last point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
@@ -83,6 +104,8 @@ pub struct Estimate {
     pub condition: Condition,
     /// The numbers behind the condition.
     pub fit: Fit,
+    /// What it was expected by. What was given and does not span the scan is not used.
+    pub guess: Guess,
     /// The scan did not fit where it was expected, and was looked for farther.
     pub searched: bool,
 }
@@ -108,6 +131,7 @@ pub struct Odometry {
     deskewed: Vec<[f32; 3]>,
     shares: Vec<f32>,
     increments: Vec<Increment>,
+    guess: Guess,
     /// Where the map's origin lies in the odometry frame.
     origin: Vector3,
     last_end: Option<Stamp>,
@@ -115,6 +139,8 @@ pub struct Odometry {
     usual_fit_share: f64,
     good_fits: usize,
     misfits: usize,
+    /// Where and when the scan was taken that became the map last.
+    remembered: Option<(Pose, Stamp)>,
     tidied_at: Vector3,
 }
 
@@ -141,11 +167,13 @@ impl Odometry {
             deskewed: Vec::new(),
             shares: Vec::new(),
             increments: Vec::new(),
+            guess: Guess::default(),
             origin: Vector3::zeros(),
             last_end: None,
             usual_fit_share: 0.8,
             good_fits: 1,
             misfits: 0,
+            remembered: None,
             tidied_at: Vector3::zeros(),
             config,
         }
@@ -192,11 +220,13 @@ impl Odometry {
         let rate = (1.0 / self.good_fits as f64).max(0.05);
         self.usual_fit_share += rate * (fitting - self.usual_fit_share);
         self.learn_agility(&timing, searched);
-        self.learn_bias(input, &timing);
-        self.remember(input, &timing);
+        self.learn_bias(&timing);
+        if self.sees_news(input.header.end) {
+            self.remember(input, &timing);
+        }
         self.scale.follow(self.source.len());
         let open = fit.degeneracy;
-        let condition = if open.any() && input.odometry.is_empty() {
+        let condition = if open.any() && self.guess != Guess::Odometry {
             Condition::Degraded(Doubt::Unobserved {
                 translations: open.translations,
                 rotations: open.rotations,
@@ -235,12 +265,16 @@ impl Odometry {
     fn guess(&mut self, input: &ScanInput<'_>, timing: &Timing, first: bool) {
         let knot = |i: usize| timing.knot(i);
         self.increments.clear();
+        self.guess = Guess::Speed;
         if first {
             return;
         }
         if !input.odometry.is_empty() {
             let out = &mut self.increments;
             from_odometry(input.odometry, knot, timing.intervals, &self.config, out);
+            if !out.is_empty() {
+                self.guess = Guess::Odometry;
+            }
         }
         if self.increments.is_empty() && !input.imu.is_empty() {
             let out = &mut self.increments;
@@ -252,6 +286,9 @@ impl Odometry {
                 &self.config,
                 out,
             );
+            if !out.is_empty() {
+                self.guess = Guess::Gyroscope;
+            }
         }
         self.chain
             .extend(timing.lead_s, timing.intervals, timing.span_s);
@@ -442,6 +479,17 @@ impl Odometry {
         self.estimate(stamp, condition, Fit::default(), true)
     }
 
+    /// Whether the scan shows more than the last one that became the map.
+    fn sees_news(&self, end: Stamp) -> bool {
+        self.map.scans() < FIRST_SCANS
+            || self.remembered.is_none_or(|(pose, stamp)| {
+                let moved = pose.inv_mul(self.chain.last());
+                moved.translation.vector.norm() >= NEWS_M
+                    || moved.rotation.angle() >= NEWS_RAD
+                    || end.nanos_since(stamp) >= NEWS_NS
+            })
+    }
+
     /// Adds the scan, deskewed by what was found, to the map.
     fn remember(&mut self, input: &ScanInput<'_>, timing: &Timing) {
         if timing.has_point_times && self.chain.poses().len() > 1 {
@@ -461,6 +509,7 @@ impl Odometry {
             };
             (rotation * nalgebra::Vector3::from(p) + shift).into()
         }));
+        self.remembered = Some((*self.chain.last(), input.header.end));
         self.tidy();
     }
 
@@ -487,6 +536,9 @@ impl Odometry {
             let shift = cells * edge;
             self.chain.translate(&-shift);
             self.agility.translate(&-shift);
+            if let Some((pose, _)) = &mut self.remembered {
+                pose.translation.vector -= shift;
+            }
             self.origin += shift;
             self.tidied_at -= shift;
         }
@@ -501,8 +553,8 @@ impl Odometry {
         self.agility.learn(poses[poses.len() / 2], timing.span_s);
     }
 
-    fn learn_bias(&mut self, input: &ScanInput<'_>, timing: &Timing) {
-        if input.imu.is_empty() || !input.odometry.is_empty() || self.increments.is_empty() {
+    fn learn_bias(&mut self, timing: &Timing) {
+        if self.guess != Guess::Gyroscope {
             return;
         }
         let integrated = self
@@ -523,6 +575,7 @@ impl Odometry {
             odom_from_lidar,
             condition,
             fit,
+            guess: self.guess,
             searched,
         }
     }

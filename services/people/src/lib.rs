@@ -13,6 +13,7 @@
 //! | [`observe`] | from an image to people with features |
 //! | [`track`] | the tracker: Kalman boxes, gated assignment, birth and death |
 //! | [`identify`] | which of them is the robot's person: FollowMe and CARPE-ID |
+//! | [`pointing`] | whom the user means who points at a place or a track |
 //! | [`watch`] | all of it, frame by frame: who is where |
 //! | [`followed`] | how well one person was followed, against the truth |
 //! | [`recording`] | tracks of a whole recording, completed once it is over |
@@ -31,6 +32,7 @@ pub mod identify;
 pub mod metrics;
 pub mod mot;
 pub mod observe;
+pub mod pointing;
 pub mod recording;
 pub mod track;
 pub mod watch;

@@ -1,6 +1,7 @@
 //! Arguments of the commands about people.
 
 pub mod enrolled;
+pub mod live;
 
 use std::path::PathBuf;
 
@@ -14,7 +15,8 @@ use hachi_world::scenes::Script;
 Example:
   hachi people track det/det.txt --out tracks.txt
   hachi people enrol Anna pictures-of-anna
-  hachi people list")]
+  hachi people list
+  hachi people watch")]
 pub enum People {
     /// Follow everyone from frame to frame.
     Track(PeopleTrackArguments),
@@ -22,7 +24,7 @@ pub enum People {
     Find(PeopleFindArguments),
     /// Who the robot knows.
     List(enrolled::PeopleListArguments),
-    /// Make the robot know somebody from pictures of them.
+    /// Make the robot know somebody, from pictures of them or from its camera.
     Enrol(enrolled::PeopleEnrolArguments),
     /// Give somebody another name.
     Rename(enrolled::PeopleRenameArguments),
@@ -30,6 +32,12 @@ pub enum People {
     Export(enrolled::PeopleExportArguments),
     /// Forget somebody: nothing of them is left in any file.
     Forget(enrolled::PeopleForgetArguments),
+    /// Who a running service has in view, and whom it knows.
+    Watch(live::PeopleWatchArguments),
+    /// Say who the robot's person is.
+    Pick(live::PeoplePickArguments),
+    /// The robot has no person any more.
+    Release(live::PeopleReleaseArguments),
 }
 
 /// Which networks to use.

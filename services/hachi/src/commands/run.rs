@@ -35,6 +35,7 @@ use crate::service::eyes;
 use crate::service::imu::ImuDevice;
 use crate::service::settings::{LidarKind, Platform};
 use crate::service::signs::SharedSigns;
+use crate::service::web::people::PeoplePage;
 use crate::service::web::{self, Page};
 use crate::service::wiring::{Devices, Running, Service, assemble};
 use crate::{can, imu};
@@ -104,9 +105,11 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
         table,
         signs,
         slam,
+        people,
         watchdog,
         ..
     } = service;
+    let mut people = Some(PeoplePage::new(people));
     let health = table.health().clone();
     let stop = AtomicBool::new(false);
     let mut watch = Watch {
@@ -128,17 +131,17 @@ fn serve(config: &Path, recording: Option<&RecordArguments>) -> Result<(), Failu
         ..ThreadsConfig::default()
     };
     let outcome = std::thread::scope(|scope| {
-        let mut server = None;
         let outcome = threads::run(table, config, |now, telemetry| {
-            if server.is_none() {
-                let page = Page {
+            if let Some(people) = people.take() {
+                let mut page = Page {
                     platform: platform.robot.name().to_owned(),
                     telemetry: Arc::clone(telemetry),
                     health: health.clone(),
                     signs: Arc::clone(&signs),
+                    people,
                 };
                 let (listener, stop) = (&listener, &stop);
-                server = Some(scope.spawn(move || web::serve(listener, &page, stop)));
+                scope.spawn(move || web::serve(listener, &mut page, stop));
             }
             watch.look(now, telemetry)
         });

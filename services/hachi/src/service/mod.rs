@@ -23,7 +23,9 @@
 //! | [`keeper`] | `keeper`: what is learnt of people, to their store; where there is one | 1 s |
 //! | [`supervisor`] | `supervisor`: what is stale, what is wrong | 50 ms |
 //!
-//! [`messages`] is what passes between them, [`signs`] what each leaves for whoever asks, [`rows`]
+//! [`orders`] about people come in through [`web`] and are carried out by tracking's [`reception`], which
+//! keeps the [`roster`] of who is known, an [`enrolment`], and the [`view`] that the page shows.
+//! [`messages`] is what passes between tasks, [`signs`] what each leaves for whoever asks, [`rows`]
 //! the table's numbers, [`settings`] the file they come from, [`eyes`] camera and networks, [`simulator`] the other side of the
 //! wire, [`web`] what is told over HTTP.
 
@@ -34,6 +36,7 @@ pub mod camera;
 pub mod crew;
 pub mod detection;
 pub mod emergency_stop;
+pub mod enrolment;
 pub mod eyes;
 pub mod filter;
 pub mod imu;
@@ -42,7 +45,10 @@ pub mod legs;
 pub mod lidar;
 pub mod messages;
 pub mod odometry;
+pub mod orders;
+pub mod reception;
 pub mod record;
+pub mod roster;
 pub mod rows;
 pub mod settings;
 pub mod signs;
@@ -51,5 +57,6 @@ pub mod simulator;
 pub mod slam;
 pub mod supervisor;
 pub mod tracking;
+pub mod view;
 pub mod web;
 pub mod wiring;

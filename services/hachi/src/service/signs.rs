@@ -159,8 +159,10 @@ pub struct Signs {
     pub network_fails: AtomicBool,
     /// How many people are in view.
     pub people_in_view: AtomicU32,
-    /// What is known of the first person whom the robot knows.
+    /// What is known of the robot's person, or the first whom it knows.
     pub person: Word,
+    /// Whether somebody is being enrolled.
+    pub enrolling: AtomicBool,
     /// Whether the patrol gave up its last place because things stood in the way.
     pub way_blocked: AtomicBool,
     /// Commands that were cut to a limit.
@@ -188,6 +190,7 @@ impl Default for Signs {
             network_fails: AtomicBool::default(),
             people_in_view: AtomicU32::default(),
             person: Word::of(PERSON_CONDITIONS),
+            enrolling: AtomicBool::default(),
             way_blocked: AtomicBool::default(),
             limited: AtomicU64::default(),
             battery_percent: AtomicU32::default(),

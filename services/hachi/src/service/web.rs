@@ -1,20 +1,24 @@
 //! What the service tells over HTTP: `/metrics` (Prometheus), `/tasks` (JSON, as `hachi top` reads
-//! it), `/health`.
+//! it), `/health`; and `/people`, where orders are taken too ([`people`]).
 //!
 //! A thread of its own, below all tasks: it reads counters and never holds one up. It answers one
-//! caller after the other, each within a second, reads no more than 4 kB of a request, and takes
-//! no orders.
+//! caller after the other, reads no more than 4 kB of a request, and for no longer than a second.
+//! What a request is, and what it may not be, is `hachi_http`'s.
+
+pub mod people;
 
 use std::io::{self, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use hachi_http::{Method, Refusal, Request, Response, request};
 use hachi_runtime::telemetry::LatencyRow;
 use hachi_runtime::{Health, TaskRow, Telemetry, prometheus};
 use serde::{Deserialize, Serialize};
 
+use self::people::PeoplePage;
 use super::signs::{ImuSigns, SharedSigns};
 
 /// What `/tasks` says.
@@ -37,7 +41,7 @@ pub struct Status {
     pub limited: u64,
     /// People in view.
     pub people_in_view: u32,
-    /// What is known of the first person whom the robot knows: `SEEN`, `FOUND`, `UNSURE`, `LOST`,
+    /// What is known of the robot's person, or the first whom it knows: `SEEN`, `FOUND`, `UNSURE`, `LOST`,
     /// `SEARCHING`; `None` where it knows nobody.
     pub person: Option<String>,
     /// Charge of the battery, per cent, where it is known.
@@ -122,10 +126,11 @@ pub struct Page {
     pub health: Health,
     /// What tasks leave.
     pub signs: SharedSigns,
+    /// Who is in view, and orders about them.
+    pub people: PeoplePage,
 }
 
-/// A request is cut off after this many bytes, and a caller after this time.
-const MOST_BYTES: usize = 4096;
+/// A caller who has not sent a request, or not taken the answer, is left after this time.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Looks this often whether to stop.
@@ -142,7 +147,7 @@ pub fn listen(address: SocketAddr) -> io::Result<TcpListener> {
 }
 
 /// Answers until `stop`.
-pub fn serve(listener: &TcpListener, page: &Page, stop: &AtomicBool) {
+pub fn serve(listener: &TcpListener, page: &mut Page, stop: &AtomicBool) {
     while !stop.load(Ordering::Acquire) {
         match listener.accept() {
             Ok((caller, _)) => {
@@ -154,63 +159,117 @@ pub fn serve(listener: &TcpListener, page: &Page, stop: &AtomicBool) {
     }
 }
 
-fn answer(mut caller: TcpStream, page: &Page) -> io::Result<()> {
+fn answer(mut caller: TcpStream, page: &mut Page) -> io::Result<()> {
     caller.set_nonblocking(false)?;
-    caller.set_read_timeout(Some(PATIENCE))?;
-    caller.set_write_timeout(Some(PATIENCE))?;
-    let path = read_path(&mut caller)?;
-    let (status, kind, body) = match path.as_deref() {
-        Some("/metrics") => {
-            let text = prometheus::text(&page.telemetry, &page.health);
-            ("200 OK", "text/plain; version=0.0.4", text)
+    let from_here = caller.peer_addr()?.ip().to_canonical().is_loopback();
+    let mut bytes = [0; request::MOST_BYTES + 1];
+    let response = match receive(&mut caller, &mut bytes)? {
+        Ok(request) if request.path == people::PATH || request.path.starts_with(people::BELOW) => {
+            page.people.answer(&request, from_here)
         }
-        Some("/tasks") => {
-            let Page {
-                platform,
-                telemetry,
-                health,
-                signs,
-            } = page;
-            let status = Status::of(platform, telemetry, health, signs);
-            let json = serde_json::to_string(&status).map_err(io::Error::other)?;
-            ("200 OK", "application/json", json)
-        }
-        Some("/health") => ("200 OK", "text/plain", page.health.line() + "\n"),
-        Some(_) => (
-            "404 Not Found",
-            "text/plain",
-            "try /metrics, /tasks or /health\n".to_owned(),
-        ),
-        None => (
-            "400 Bad Request",
-            "text/plain",
-            "only GET is answered\n".to_owned(),
-        ),
+        Ok(request) => page.answer(&request)?,
+        Err(refusal) => Response::text(refusal.status(), format!("{refusal}\n")),
     };
-    let head = format!(
-        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
-        body.len()
-    );
-    caller.write_all(head.as_bytes())?;
-    caller.write_all(body.as_bytes())
+    send(&mut caller, &response.to_bytes())?;
+    drain(&mut caller)
 }
 
-/// The path of a GET; `None` for anything else.
-fn read_path(caller: &mut TcpStream) -> io::Result<Option<String>> {
-    let begun = Instant::now();
-    let mut request = Vec::with_capacity(MOST_BYTES);
-    let mut piece = [0; 512];
-    while !request.windows(4).any(|end| end == b"\r\n\r\n") {
-        let count = caller.read(&mut piece)?;
-        request.extend_from_slice(&piece[..count]);
-        if count == 0 || request.len() > MOST_BYTES || begun.elapsed() > PATIENCE {
+impl Page {
+    /// What is asked for most.
+    fn answer(&self, request: &Request<'_>) -> io::Result<Response> {
+        let Self {
+            platform,
+            telemetry,
+            health,
+            signs,
+            ..
+        } = self;
+        Ok(match (request.method, request.path) {
+            (Method::Get, "/metrics") => Response {
+                content_type: "text/plain; version=0.0.4",
+                ..Response::text(200, prometheus::text(telemetry, health))
+            },
+            (Method::Get, "/tasks") => {
+                let status = Status::of(platform, telemetry, health, signs);
+                let json = serde_json::to_string(&status).map_err(io::Error::other)?;
+                Response::json(200, json)
+            }
+            (Method::Get, "/health") => Response::text(200, health.line() + "\n"),
+            (Method::Post, "/metrics" | "/tasks" | "/health") => {
+                Response::text(405, "only GET is answered here\n")
+            }
+            _ => Response::text(404, "try /metrics, /tasks, /health or /people\n"),
+        })
+    }
+}
+
+/// The caller's request, or why there is none.
+fn receive<'a>(
+    caller: &mut TcpStream,
+    bytes: &'a mut [u8; request::MOST_BYTES + 1],
+) -> io::Result<Result<Request<'a>, Refusal>> {
+    let ends = Instant::now() + PATIENCE;
+    let mut length = 0;
+    loop {
+        match request::parse(&bytes[..length]) {
+            Ok(Some(_)) => break,
+            Ok(None) => {}
+            Err(refusal) => return Ok(Err(refusal)),
+        }
+        let late = || Refusal::Late {
+            limit_ms: PATIENCE.as_millis() as u64,
+        };
+        let left = ends.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(Err(late()));
+        }
+        caller.set_read_timeout(Some(left))?;
+        match caller.read(&mut bytes[length..]) {
+            Ok(0) => return Ok(Err(Refusal::CutShort)),
+            Ok(count) => length += count,
+            Err(error) if is_timeout(&error) => return Ok(Err(late())),
+            Err(error) => return Err(error),
+        }
+    }
+    // Parsed once more, now that nothing is written into the bytes any more.
+    Ok(request::parse(&bytes[..length]).and_then(|request| request.ok_or(Refusal::CutShort)))
+}
+
+/// Sends all of it, or as much as the caller takes in time.
+fn send(caller: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
+    let ends = Instant::now() + PATIENCE;
+    while !bytes.is_empty() {
+        let left = ends.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        caller.set_write_timeout(Some(left))?;
+        match caller.write(bytes)? {
+            0 => return Err(io::ErrorKind::WriteZero.into()),
+            count => bytes = &bytes[count..],
+        }
+    }
+    Ok(())
+}
+
+/// Takes what the caller still sends, for a moment and not much of it: a line that is closed with
+/// something unread is torn down, and the answer with it.
+fn drain(caller: &mut TcpStream) -> io::Result<()> {
+    caller.shutdown(Shutdown::Write)?;
+    caller.set_read_timeout(Some(LOOK_UP))?;
+    let mut rest = [0; request::MOST_BYTES];
+    for _ in 0..4 {
+        if caller.read(&mut rest)? == 0 {
             break;
         }
     }
-    let text = String::from_utf8_lossy(&request);
-    let mut words = text.lines().next().unwrap_or_default().split(' ');
-    Ok(match (words.next(), words.next()) {
-        (Some("GET"), Some(path)) => Some(path.to_owned()),
-        _ => None,
-    })
+    Ok(())
+}
+
+fn is_timeout(error: &io::Error) -> bool {
+    // Which of the two it is depends on the system.
+    matches!(
+        error.kind(),
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+    )
 }

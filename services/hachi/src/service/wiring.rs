@@ -10,11 +10,13 @@
 //!
 //! chip ─ imu ─ odometry
 //!
-//! pictures ─ camera receive ─ detection ─ tracking
+//! pictures ─ camera receive ─ detection ─ tracking ─ view
+//!                                            ↑ orders
 //! ```
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Obstacles, Patrol, SafetyGate, Sight};
 use hachi_bridge::message::Sensor;
@@ -39,19 +41,24 @@ use super::camera::{CameraReceive, PictureSource};
 use super::crew::Crew;
 use super::detection::Detection;
 use super::emergency_stop::{EmergencyStopTask, StopBus};
+use super::enrolment::Enrolment;
 use super::filter::Filter;
 use super::imu::{ImuDevice, ImuTask};
-use super::keeper::{Kept as KeptPeople, keeper};
+use super::keeper::{Kept as KeptPeople, NamedEnd, keeper};
 use super::legs::Legs;
 use super::lidar::LidarReceive;
-use super::messages::{Belt, Correction, Kept, Looked, Picture, Placed, Scan, belt};
+use super::messages::{Belt, BeltEnd, Correction, Kept, Looked, Picture, Placed, Scan, belt};
 use super::odometry::OdometryTask;
+use super::orders::{self, Desk};
+use super::reception::Reception;
 use super::record::{Datagram, RecorderTask, Tap};
+use super::roster::Roster;
 use super::settings::{Platform, row};
 use super::signs::SharedSigns;
 use super::slam::SlamTask;
 use super::supervisor::Supervisor;
 use super::tracking::{Audience, Tracking};
+use super::view::View;
 use super::{imu, odometry, record, rows};
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
@@ -128,6 +135,33 @@ impl Running {
     }
 }
 
+/// An order about people is waited for so long: most are carried out with the next picture, one that
+/// points at nobody takes a second of pictures.
+const ORDER_PATIENCE: Duration = Duration::from_secs(3);
+
+/// Where people are told of, and orders about them taken.
+pub struct PeopleDesk {
+    /// Orders.
+    pub desk: Desk,
+    /// Who is in view.
+    pub views: BeltEnd<View>,
+    /// What the known are called; nobody is kept without.
+    pub named: Option<NamedEnd>,
+    /// Whether people can be told apart.
+    pub tells_apart: bool,
+    /// The clock of pictures.
+    pub clock: TaskClock,
+}
+
+/// Why there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoPeople {
+    /// The settings do not ask for people.
+    NotAskedFor,
+    /// The networks that find them are not there.
+    NoNetworks,
+}
+
 /// The service, ready for an executor.
 pub struct Service {
     /// Its tasks.
@@ -138,6 +172,8 @@ pub struct Service {
     pub record: Arc<Mutex<RunRecord>>,
     /// SLAM; likewise.
     pub slam: Arc<Mutex<SlamStage>>,
+    /// Where people are told of.
+    pub people: Result<PeopleDesk, NoPeople>,
     /// Bites when the base command task hangs.
     pub watchdog: SoftWatchdog,
     /// How long a scan takes through filter, odometry and SLAM.
@@ -388,9 +424,10 @@ where
     };
     table.add(spec, to_slam, gauges, Box::new(task));
 
-    if let Some(eyes) = devices.eyes {
-        open(eyes, settings, &mut table, &signs);
-    }
+    let people = match devices.eyes {
+        Some(eyes) => open(eyes, settings, &mut table, &signs),
+        None => Err(NoPeople::NotAskedFor),
+    };
 
     if records {
         let gauges = vec![
@@ -414,13 +451,19 @@ where
         signs,
         record,
         slam,
+        people,
         watchdog,
         scan_times,
     })
 }
 
-/// The tasks behind a camera.
-fn open(eyes: Eyes, settings: &Settings, table: &mut TaskTable, signs: &SharedSigns) {
+/// The tasks behind a camera, and where people are told of.
+fn open(
+    eyes: Eyes,
+    settings: &Settings,
+    table: &mut TaskTable,
+    signs: &SharedSigns,
+) -> Result<PeopleDesk, NoPeople> {
     signs
         .model_missing
         .store(eyes.model_missing, Ordering::Relaxed);
@@ -437,14 +480,38 @@ fn open(eyes: Eyes, settings: &Settings, table: &mut TaskTable, signs: &SharedSi
     let bell = table.bell();
     let spec = row(settings, rows::CAMERA_RECEIVE);
     table.add(spec, bell, vec![], Box::new(receive));
-    let Some(people) = eyes.people else { return };
-
-    let acquaintances = people.kept.map(|kept| {
-        let bell = table.bell();
-        let (keeper, acquaintances) = keeper(kept, &bell);
-        table.add(row(settings, rows::KEEPER), bell, vec![], Box::new(keeper));
-        acquaintances
-    });
+    let Some(mut people) = eyes.people else {
+        return Err(match eyes.model_missing {
+            true => NoPeople::NoNetworks,
+            false => NoPeople::NotAskedFor,
+        });
+    };
+    let tells_apart = people.observer.appearance().is_some();
+    let nobody = table.bell();
+    let (desk, inbox) = orders::orders(&to_tracking, &nobody, ORDER_PATIENCE);
+    // Of what is known only the newest counts: that the rest goes is no loss, and is not told.
+    let (views, views_end) = belt::<View>(table, "views", 1, &nobody);
+    let (mut acquaintances, mut named) = (None, None);
+    let enrolment = match people.kept {
+        Some(kept) => {
+            let ends = keeper(kept, &to_tracking, &nobody, Arc::clone(signs));
+            let (spec, bell) = (row(settings, rows::KEEPER), table.bell());
+            table.add(spec, bell, vec![], Box::new(ends.keeper));
+            (acquaintances, named) = (Some(ends.acquaintances), Some(ends.named));
+            Some(Enrolment::new(ends.sittings))
+        }
+        None => None,
+    };
+    let reception = Reception {
+        roster: Roster::default(),
+        inbox,
+        acquaintances,
+        enrolment,
+        views,
+        shown: None,
+        said: None,
+        signs: Arc::clone(signs),
+    };
     let watch = Watch::new(people.observer.even_score(), settings.people.identify);
     let gauges = vec![pictures_end.full.gauge()];
     let detection = Detection {
@@ -463,7 +530,7 @@ fn open(eyes: Eyes, settings: &Settings, table: &mut TaskTable, signs: &SharedSi
         watch,
         looked: looked_end,
         last: None,
-        acquaintances,
+        reception,
         audience: people.audience,
         latency: table.latency("shutter to target"),
         clock: table.clock().clone(),
@@ -472,6 +539,13 @@ fn open(eyes: Eyes, settings: &Settings, table: &mut TaskTable, signs: &SharedSi
     };
     let spec = row(settings, rows::TRACKING);
     table.add(spec, to_tracking, gauges, Box::new(tracking));
+    Ok(PeopleDesk {
+        desk,
+        views: views_end,
+        named,
+        tells_apart,
+        clock: table.clock().clone(),
+    })
 }
 
 /// The driver of a sensor, as a task.

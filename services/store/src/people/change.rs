@@ -23,7 +23,7 @@ impl PeopleFile {
     /// The name is none or taken, something is no model or picture, or it can't be written; nothing
     /// is kept then.
     pub fn enrol(&mut self, person: &NewPerson<'_>) -> Result<PersonEntry, PeopleError> {
-        let name = checked_name(person.name)?;
+        let name = check_form_of_name(person.name)?;
         check_model(person.model)?;
         check_images(person.images)?;
         self.write(|change| {
@@ -100,7 +100,7 @@ impl PeopleFile {
     /// # Errors
     /// As [`enrol`](Self::enrol), and [`PeopleError::Unknown`].
     pub fn rename(&mut self, person: &PersonEntry, name: &str) -> Result<(), PeopleError> {
-        let name = checked_name(name)?;
+        let name = check_form_of_name(name)?;
         self.write(|change| {
             let key = change.key(person)?;
             check_free(&change.listing()?, name, Some(person.id))?;
@@ -216,8 +216,11 @@ impl Change<'_> {
     }
 }
 
-/// The name without white space around it.
-pub(super) fn checked_name(name: &str) -> Result<&str, PeopleError> {
+/// The name without white space around it, if it has the form of one.
+///
+/// # Errors
+/// [`PeopleError::NotAName`].
+pub fn check_form_of_name(name: &str) -> Result<&str, PeopleError> {
     let trimmed = name.trim();
     let length = trimmed.chars().count();
     if !(1..=LONGEST_NAME).contains(&length) || trimmed.chars().any(char::is_control) {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use hachi_people::identify::AppearanceModel;
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior};
 
-use super::change::{check_free, checked_name};
+use super::change::{check_form_of_name, check_free};
 use super::keys::KeyRing;
 use super::person::{Listing, PersonEntry, StoredId, StoredImages, StoredModel};
 use super::seal::Place;
@@ -193,7 +193,7 @@ impl PeopleFile {
     /// # Errors
     /// It is none, or taken.
     pub fn check_name(&self, name: &str) -> Result<(), PeopleError> {
-        let name = checked_name(name)?;
+        let name = check_form_of_name(name)?;
         check_free(&self.list()?, name, None)
     }
 

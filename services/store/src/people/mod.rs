@@ -36,6 +36,7 @@ pub mod person;
 mod seal;
 mod tables;
 
+pub use change::check_form_of_name;
 pub use error::PeopleError;
 pub use file::{PeopleFile, PeoplePaths};
 pub use network::NetworkIdentity;

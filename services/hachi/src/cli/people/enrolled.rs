@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::NetworkArguments;
+use super::live::ServiceArguments;
 
 /// Where people are kept.
 #[derive(Debug, Clone, Args)]
@@ -38,16 +39,26 @@ wide), or frames in which nobody else is. At least 9 are needed, from all sides 
 place; two thirds say what the person looks like, one third how much that varies. Pictures that show \
 nobody or more than one person are left out and named. Up to 64 are kept, encrypted.
 
+With --live it is the running service (`hachi run`) that takes thirty pictures, of whoever stands alone \
+in front of the robot and turns round once, and keeps them in its own store.
+
 Example:
   hachi people enrol Anna anna/*.jpg
-  hachi people enrol Anna frames --store /var/lib/hachi/people.db")]
+  hachi people enrol Anna frames --store /var/lib/hachi/people.db
+  hachi people enrol Anna --live")]
 pub struct PeopleEnrolArguments {
     /// What to call them.
     #[arg(value_name = "NAME")]
     pub name: String,
     /// Pictures of them, or folders of pictures.
-    #[arg(value_name = "IMAGE", required = true)]
+    #[arg(value_name = "IMAGE", required_unless_present = "live")]
     pub images: Vec<PathBuf>,
+    /// From the running robot's camera; the store and the networks are the service's.
+    #[arg(long, conflicts_with_all = ["images", "store", "key", "models", "detector", "reid"])]
+    pub live: bool,
+    /// With --live, the service, as its settings say under service.listen.
+    #[command(flatten)]
+    pub service: ServiceArguments,
     /// Where people are kept.
     #[command(flatten)]
     pub store: StoreArguments,

@@ -9,8 +9,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use hachi_hal::Stamp;
 use hachi_inference::ImageView;
 use hachi_people::followed::{ScoreKeeper, Sight};
+use hachi_people::pointing::track_at;
 use hachi_people::track::Track;
-use hachi_people::watch::{Watch, track_at};
+use hachi_people::watch::Watch;
 use hachi_world::CameraConfig;
 use serde::Serialize;
 

@@ -11,12 +11,10 @@ use serde::Serialize;
 use super::portrait::{self, Meant};
 use crate::cli::people::enrolled::PeopleEnrolArguments;
 use crate::exit::Failure;
-use crate::images::{self, Rgb};
+use crate::images;
 use crate::interrupt::Cancelled;
 use crate::{networks, output, progress, saved_people};
 
-/// Pictures are kept at most so high: twice what networks look at.
-const MOST_HIGH: usize = 512;
 /// Somebody else's model that takes so many of the pictures for its person would mix the two up.
 const ALIKE_SHARE: f64 = 0.5;
 
@@ -64,7 +62,7 @@ pub fn run(arguments: &PeopleEnrolArguments) -> Result<(), Failure> {
             return Err(Failure::Interrupted("nobody was enrolled".to_owned()));
         }
         let seen = portrait::read(&mut observer, file, Meant::Only)
-            .and_then(|portrait| Ok((kept(portrait.crop)?, portrait.feature)));
+            .and_then(|portrait| Ok((images::kept(portrait.crop)?, portrait.feature)));
         match seen {
             Ok((crop, feature)) => {
                 calibration.push(&feature);
@@ -123,14 +121,6 @@ fn files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
     }
     Ok(files)
-}
-
-/// A crop as it is kept.
-fn kept(mut crop: Rgb) -> Result<Vec<u8>, String> {
-    while crop.height.max(crop.width) > MOST_HIGH && crop.height.min(crop.width) > 1 {
-        crop = crop.shrunk(2);
-    }
-    crop.to_png().map_err(|error| error.to_string())
 }
 
 /// At most so many of them, spread over all.
@@ -211,12 +201,12 @@ mod tests {
         assert_eq!(evenly(images.clone(), 10), images);
         let few: Vec<u8> = evenly(images, 4).concat();
         assert_eq!(few, [2, 4, 7, 9]);
-        let large = Rgb {
+        let large = images::Rgb {
             width: 300,
             height: 1_100,
             pixels: vec![9; 3 * 300 * 1_100],
         };
-        let kept = images::decode(&kept(large).unwrap()).unwrap();
+        let kept = images::decode(&images::kept(large).unwrap()).unwrap();
         assert_eq!((kept.width, kept.height), (75, 275));
     }
 }
