@@ -6,8 +6,8 @@ mod program;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, Once};
 use std::time::Duration;
 
 use hachi::config::{MotionInput, Settings};
@@ -39,6 +39,38 @@ const PERIOD_NS: i64 = 250 * MS;
 /// A step of virtual time while somebody waits for an answer.
 const STEP_NS: i64 = 50 * MS;
 
+/// Everything that is logged in this process.
+static LOG: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+
+struct Log;
+
+impl Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        LOG.lock().unwrap().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+fn keep_the_log() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        tracing_subscriber::fmt()
+            .with_ansi(false)
+            .with_max_level(tracing::Level::TRACE)
+            .with_writer(|| Log)
+            .init();
+    });
+}
+
+/// What was logged so far.
+fn logged() -> String {
+    String::from_utf8(LOG.lock().unwrap().clone()).unwrap()
+}
+
 /// A service with a camera, and its page.
 struct Rig {
     run: VirtualTime,
@@ -54,10 +86,17 @@ struct Rig {
 impl Rig {
     /// One before whose camera these people are about; it looks for them if it has a store.
     fn new(people: Vec<Person>, store: Option<&Path>) -> Self {
-        Self::patient(people, store, Duration::from_secs(60))
+        Self::with(people, store, Duration::from_secs(60), None)
     }
 
-    fn patient(people: Vec<Person>, store: Option<&Path>, patience: Duration) -> Self {
+    /// One that waits so long for an order, and has so many bytes of room in its store.
+    fn with(
+        people: Vec<Person>,
+        store: Option<&Path>,
+        patience: Duration,
+        room: Option<u64>,
+    ) -> Self {
+        keep_the_log();
         let mut settings = Settings::load(Some("b1"), None).unwrap();
         settings.motion = MotionInput::Odometry;
         settings.people.enabled = store.is_some();
@@ -67,6 +106,10 @@ impl Rig {
         // No camera has this number: the pictures come from the renderer.
         settings.camera.serial = Some("none".to_owned());
         let eyes = eyes::of_this_computer(&settings, SystemClock::new());
+        if let (Some(eyes), Some(room)) = (&eyes, room) {
+            let kept = eyes.people.as_ref().and_then(|people| people.kept.as_ref());
+            kept.unwrap().store.set_quota(room).unwrap();
+        }
 
         let mut world = SimulationConfig::preset(Preset::Office, 2, f64::MAX);
         world.base_from_lidar = settings.base_from_lidar.pose();
@@ -362,9 +405,14 @@ fn whoever_is_enrolled_in_front_of_the_robot_is_known_by_name_when_they_come_bac
     let (_folder, store) = store();
     let mut rig = Rig::new(vec![anna(), berta([5.5, 1.2], 19.5)], Some(&store));
     rig.pass(2.5);
+    let (_, picked) = rig.post("/people/pick", &rig.place_of(1));
     let enrolled = rig.command(&["enrol", "Anna", "--live", "--json"]).json();
     assert_eq!(enrolled["images_used"], 30);
     let number = &enrolled["person"];
+    assert_eq!(
+        number, &picked["person"],
+        "who was picked keeps their number"
+    );
     let people = rig.people();
     assert_eq!(people["enrolment"]["stage"], "done");
     assert_eq!(people["known"][0]["name"], "Anna");
@@ -404,6 +452,17 @@ fn whoever_is_enrolled_in_front_of_the_robot_is_known_by_name_when_they_come_bac
     file.forget(&entry).unwrap();
     rig.pass(1.5);
     assert_eq!(rig.people()["known"], json!([]));
+
+    // All of that is in the log, and nobody's name.
+    let log = logged();
+    for line in [
+        "order=\"/people/enrol\" answer=Ok(Begun(1))",
+        "stage=Done",
+        "answer=Ok(Picked",
+    ] {
+        assert!(log.contains(line), "{line}");
+    }
+    assert!(!log.contains("Anna"));
 }
 
 #[test]
@@ -411,7 +470,8 @@ fn an_enrolment_is_refused_cancelled_and_fails_without_a_trace() {
     let (_folder, store) = store();
     let mut person = somebody();
     person.visits[0].path = vec![[4.0, 0.5]];
-    let mut rig = Rig::new(vec![person, berta([4.0, -0.5], 4.0)], Some(&store));
+    let people = vec![person, berta([4.0, -0.5], 16.0)];
+    let mut rig = Rig::with(people, Some(&store), Duration::from_secs(60), Some(1));
     let anna = json!({ "name": "Anna" });
     let (status, refused) = rig.post("/people/enrol", &json!({ "name": " " }));
     assert_eq!(status, 422, "{refused}");
@@ -434,7 +494,15 @@ fn an_enrolment_is_refused_cancelled_and_fails_without_a_trace() {
     assert_eq!((status, &cancelled["cancelled"]), (200, &json!(true)));
     let (_, cancelled) = rig.post("/people/cancel", &json!({}));
     assert_eq!(cancelled["cancelled"], false);
-    rig.pass_until(6.0);
+    // All looks are taken, and there is no room for them.
+    let failed = rig.command(&["enrol", "Anna", "--live"]);
+    let line = failed.failure();
+    assert!(
+        line.contains("no room to write") && line.contains("free some space"),
+        "{line}"
+    );
+    assert_eq!(rig.people()["known"], json!([]));
+    rig.pass_until(18.0);
     let refused = rig.command(&["enrol", "Anna", "--live"]);
     assert!(
         refused.failure().contains("2 people stand in front"),
@@ -501,7 +569,7 @@ fn what_is_no_order_or_comes_from_elsewhere_is_refused_with_what_to_do() {
 fn orders_are_checked_and_rated_and_one_that_no_picture_carries_out_is_withdrawn() {
     let (_folder, store) = store();
     let person = berta([3.5, 0.0], 0.0);
-    let mut rig = Rig::patient(vec![person], Some(&store), Duration::from_millis(300));
+    let mut rig = Rig::with(vec![person], Some(&store), Duration::from_millis(300), None);
     let address = rig.address;
     for (path, body, status) in [
         ("/people/pick", "{\"track\": 3", 400),

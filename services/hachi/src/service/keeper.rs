@@ -385,6 +385,8 @@ mod tests {
         acquaintances: Acquaintances,
         named: NamedEnd,
         sittings: Sender<Box<Sitting>>,
+        to_tracking: Bell,
+        signs: SharedSigns,
         roster: Roster,
         watch: Watch,
         other: PeopleFile,
@@ -403,12 +405,15 @@ mod tests {
             let now = Stamp::from_nanos(1);
             let table = TaskTable::new(TaskClock::new(VirtualClock::starting_at(now)));
             let (to_tracking, nobody) = (table.bell(), table.bell());
-            let ends = keeper(kept, &to_tracking, &nobody, SharedSigns::default());
+            let signs = SharedSigns::default();
+            let ends = keeper(kept, &to_tracking, &nobody, signs.clone());
             Self {
                 keeper: ends.keeper,
                 acquaintances: ends.acquaintances,
                 named: ends.named,
                 sittings: ends.sittings,
+                to_tracking,
+                signs,
                 roster: Roster::default(),
                 watch: Watch::new(0.5, IdentifierConfig::default()),
                 other: PeopleFile::open_or_create(&paths).unwrap(),
@@ -565,5 +570,15 @@ mod tests {
         rig.keep();
         assert!(rig.acquaintances.settled.receive().unwrap().kept.is_some());
         assert_eq!(rig.other.list().unwrap().people.len(), 2);
+    }
+
+    #[test]
+    fn tracking_is_woken_to_look_at_the_time_while_somebody_is_enrolled() {
+        let mut rig = Rig::new();
+        rig.keep();
+        assert_eq!(rig.to_tracking.hear(), None);
+        rig.signs.enrolling.store(true, Ordering::Relaxed);
+        rig.keep();
+        assert!(rig.to_tracking.hear().is_some());
     }
 }

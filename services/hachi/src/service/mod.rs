@@ -25,7 +25,7 @@
 //!
 //! [`orders`] about people come in through [`web`] and are carried out by tracking's [`reception`], which
 //! keeps the [`roster`] of who is known, an [`enrolment`], and the [`view`] that the page shows.
-//! [`messages`] is what passes between tasks, [`signs`] what each leaves for whoever asks, [`rows`]
+//! [`people`] puts the tasks behind the camera together. [`messages`] is what passes between tasks, [`signs`] what each leaves for whoever asks, [`rows`]
 //! the table's numbers, [`settings`] the file they come from, [`eyes`] camera and networks, [`simulator`] the other side of the
 //! wire, [`web`] what is told over HTTP.
 
@@ -46,6 +46,7 @@ pub mod lidar;
 pub mod messages;
 pub mod odometry;
 pub mod orders;
+pub mod people;
 pub mod reception;
 pub mod record;
 pub mod roster;

@@ -2,7 +2,7 @@
 //!
 //! In: an [`Order`] at the desk. Out: its [`Answer`], or that there is none in time. An order waits in a
 //! bounded queue; neither end ever waits for the other inside a lock. One that nobody took in time is
-//! withdrawn, so that what was said not to be done is not done later: a [`Ticket`] goes with it, which
+//! withdrawn, so that what was said not to be done is not done later: a `Ticket` goes with it, which
 //! one of the two ends takes for good.
 
 use std::sync::Arc;
@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
 use hachi_people::pointing::{NotPicked, Pointed};
+use hachi_runtime::queue::Gauge;
 use hachi_runtime::{Bell, Receiver, Sender, WhenFull, bounded};
 
 /// Orders under way.
@@ -197,6 +198,11 @@ impl Inbox {
         self.current.take_if(|current| withdrawn(current)).is_some()
     }
 
+    /// What is told about the queue.
+    pub fn gauge(&self) -> Arc<dyn Gauge> {
+        self.orders.gauge()
+    }
+
     /// The order that is held, if one is.
     pub fn held(&self) -> Option<&Order> {
         self.current.as_ref().map(|current| &current.order)
@@ -281,6 +287,6 @@ mod tests {
             assert_eq!(desk.give(Order::Release), Err(NoAnswer::Withdrawn));
         }
         assert_eq!(desk.give(Order::Release), Err(NoAnswer::Full));
-        assert_eq!(inbox.orders.gauge().dropped(), 1);
+        assert_eq!(inbox.gauge().dropped(), 1);
     }
 }

@@ -19,6 +19,9 @@ use super::roster::Roster;
 use super::signs::SharedSigns;
 use super::view::{Shown, View};
 
+/// An enrolment waits so long for somebody to be seen in front, seconds.
+const PATIENCE_S: f64 = 1.0;
+
 /// Tracking's side of it.
 pub struct Reception {
     /// Who is known.
@@ -33,6 +36,8 @@ pub struct Reception {
     pub views: Belt<View>,
     /// The last picture.
     pub shown: Option<Shown>,
+    /// Since when an enrolment waits for somebody to be seen in front.
+    pub nobody_since: Option<Stamp>,
     /// What was last said of the enrolment.
     pub said: Option<(u32, Stage)>,
     /// Where it is left that somebody is being enrolled.
@@ -67,6 +72,7 @@ impl Reception {
                     continue;
                 }
                 Order::Enrol(_) => {
+                    self.nobody_since = None;
                     self.inbox.later();
                     continue;
                 }
@@ -109,7 +115,11 @@ impl Reception {
                     Some(enrolment) => enrolment.begin(name, watch.tracks(), looked, now),
                     None => Err(NotBegun::NoStore),
                 };
-                Some(begun.map_or_else(Answer::NotBegun, Answer::Begun))
+                // Detectors miss one in four: a single picture without anybody says little.
+                let stamp = looked.picture.stamp;
+                let since = *self.nobody_since.get_or_insert(stamp);
+                let waits = begun == Err(NotBegun::Nobody) && stamp.secs_since(since) < PATIENCE_S;
+                (!waits).then(|| begun.map_or_else(Answer::NotBegun, Answer::Begun))
             }
             _ => None,
         };
@@ -185,5 +195,164 @@ impl Reception {
         if let Some(enrolment) = self.enrolment.as_mut().filter(|_| of_this.is_some()) {
             enrolment.settle(person);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use hachi_people::BoundingBox;
+    use hachi_people::identify::{AppearanceModel, Condition, IdentifierConfig};
+    use hachi_people::observe::Observation;
+    use hachi_people::track::{Detection, Features};
+    use hachi_runtime::{TaskClock, TaskTable, VirtualClock, WhenFull, bounded};
+    use hachi_store::people::{NetworkIdentity, NewPerson, PeopleFile, PeoplePaths, StoredId};
+
+    use super::super::messages::belt;
+    use super::super::orders::orders;
+    use super::*;
+
+    const LOOKS: [f32; 2] = [1.0, 0.5];
+
+    /// A robot before which one person stands who is being enrolled.
+    struct Rig {
+        reception: Reception,
+        watch: Watch,
+        looked: Looked,
+        now: Stamp,
+        store: PeopleFile,
+        _folder: tempfile::TempDir,
+    }
+
+    impl Rig {
+        fn new() -> Self {
+            let now = Stamp::from_nanos(1);
+            let clock = TaskClock::new(VirtualClock::starting_at(now));
+            let table = TaskTable::new(clock);
+            let nobody = table.bell();
+            let (views, _) = belt::<View>(&table, "views", 1, &nobody);
+            let (sittings, _) = bounded("sittings", 1, WhenFull::DropNewest, &nobody);
+            let (_, inbox) = orders(&nobody, &nobody, Duration::from_secs(1));
+            let folder = tempfile::tempdir().unwrap();
+            let paths = PeoplePaths::beside(&folder.path().join("people.db"));
+            let mut looked = Looked::default();
+            (looked.picture.width, looked.picture.height) = (400, 200);
+            looked.picture.rgb = vec![7; 3 * 400 * 200];
+            Self {
+                reception: Reception {
+                    roster: Roster::default(),
+                    inbox,
+                    acquaintances: None,
+                    enrolment: Some(Enrolment::new(sittings)),
+                    views,
+                    shown: None,
+                    nobody_since: None,
+                    said: None,
+                    signs: Arc::default(),
+                },
+                watch: Watch::new(0.5, IdentifierConfig::default()),
+                looked,
+                now,
+                store: PeopleFile::open_or_create(&paths).unwrap(),
+                _folder: folder,
+            }
+        }
+
+        fn see(&mut self, pictures: usize) {
+            for _ in 0..pictures {
+                self.now = self.now + 100_000_000;
+                let observed = Observation {
+                    detections: &[Detection {
+                        bounding_box: BoundingBox::new(180.0, 40.0, 40.0, 100.0),
+                        score: 0.95,
+                    }],
+                    features: Some(Features {
+                        dimension: 2,
+                        values: &LOOKS,
+                        same_person_distance: 0.4,
+                    }),
+                };
+                self.watch.step(&observed, 0.1);
+                self.looked.keep(&observed);
+                self.looked.picture.stamp = self.now;
+                self.reception.see(&mut self.watch, &self.looked, self.now);
+            }
+        }
+
+        /// Whoever stands there is in the store by this name from now on; their number.
+        fn enrol(&mut self, name: &str) -> (StoredId, Option<u32>) {
+            let tracks = self.watch.tracks();
+            let enrolment = self.reception.enrolment.as_mut().unwrap();
+            let number = enrolment
+                .begin(name, tracks, &self.looked, self.now)
+                .unwrap();
+            self.see(80);
+            let model = AppearanceModel::first(&LOOKS).unwrap();
+            let entry = self.store.enrol(&NewPerson {
+                name,
+                enrolled_unix_s: 0,
+                network: &NetworkIdentity::of_bytes("test", b"a network"),
+                model: &model,
+                images: &[],
+            });
+            let stored = entry.unwrap().id;
+            let kept = Some((stored, model));
+            self.reception
+                .settle(&mut self.watch, Settled { number, kept });
+            let enrolment = self.reception.enrolment.as_ref().unwrap();
+            let progress = enrolment.progress().unwrap();
+            assert_eq!(progress.stage, Stage::Done);
+            (stored, progress.person)
+        }
+
+        fn condition(&self, number: u32) -> Condition {
+            let known = self.reception.roster.people().iter();
+            let known = known.copied().find(|known| known.number == number).unwrap();
+            let mut statuses = self.watch.statuses();
+            statuses
+                .find(|s| s.person == known.person)
+                .unwrap()
+                .condition
+        }
+    }
+
+    #[test]
+    fn whoever_was_picked_and_is_enrolled_keeps_their_number_and_is_the_robots_person() {
+        let mut rig = Rig::new();
+        rig.see(5);
+        let track = rig.watch.tracks()[0].id;
+        rig.watch.point(
+            hachi_people::pointing::Pointed::Track(track),
+            Meant::Anybody,
+        );
+        rig.see(1);
+        assert_eq!(rig.reception.roster.picked(), Some(1));
+        let (stored, number) = rig.enrol("Anna");
+        assert_eq!(number, Some(1));
+        let [known] = *rig.reception.roster.people() else {
+            panic!("more than one");
+        };
+        assert_eq!(known.stored, Some(stored));
+        assert_eq!(rig.reception.roster.picked(), Some(1));
+        rig.see(2);
+        assert_eq!(rig.condition(1), Condition::Seen);
+        // Released, somebody in the store stays known.
+        assert_eq!(rig.reception.release(&mut rig.watch), Some(1));
+        assert_eq!(rig.watch.statuses().count(), 1);
+    }
+
+    #[test]
+    fn whoever_is_enrolled_on_a_known_person_s_track_is_who_the_user_says_they_are() {
+        let mut rig = Rig::new();
+        rig.see(5);
+        let (_, anna) = rig.enrol("Anna");
+        rig.see(2);
+        let (_, hanna) = rig.enrol("Hanna");
+        rig.see(2);
+        assert_eq!((anna, hanna), (Some(1), Some(2)));
+        assert_eq!(rig.condition(2), Condition::Seen);
+        assert_eq!(rig.condition(1), Condition::Searching);
     }
 }

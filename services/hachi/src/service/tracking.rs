@@ -141,6 +141,7 @@ mod tests {
                 enrolment: None,
                 views,
                 shown: None,
+                nobody_since: None,
                 said: None,
                 signs: Arc::clone(&signs),
             };

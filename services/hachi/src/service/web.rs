@@ -154,7 +154,11 @@ pub fn serve(listener: &TcpListener, page: &mut Page, stop: &AtomicBool) {
                 // A caller that goes away is its own matter.
                 let _ = answer(caller, page);
             }
-            Err(_) => std::thread::sleep(LOOK_UP),
+            Err(_) => {
+                // Names that are forgotten go, whether somebody asks or not.
+                page.people.hear();
+                std::thread::sleep(LOOK_UP);
+            }
         }
     }
 }

@@ -10,13 +10,10 @@
 //!
 //! chip ─ imu ─ odometry
 //!
-//! pictures ─ camera receive ─ detection ─ tracking ─ view
-//!                                            ↑ orders
+//! pictures ─ camera receive ─ detection ─ tracking   (people)
 //! ```
 
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use hachi_behaviour::{Causes, GuardedBase, ObstacleFinder, Obstacles, Patrol, SafetyGate, Sight};
 use hachi_bridge::message::Sensor;
@@ -25,7 +22,6 @@ use hachi_hal::{LidarScans, PacketSource, Pose, Rotation, Stamp};
 use hachi_imu::ImuCounters;
 use hachi_odometry::{Odometry, OdometryConfig};
 use hachi_people::observe::Observer;
-use hachi_people::watch::Watch;
 use hachi_robosense::{RobosenseConfig, RobosenseScans};
 use hachi_runtime::{Histogram, SoftWatchdog, TaskClock, TaskTable, WhenFull, Work, bounded};
 use hachi_slam::Slam;
@@ -37,29 +33,24 @@ use nalgebra::Translation3;
 use super::base::BaseCommandTask;
 use super::behaviour::Behaviour;
 use super::body::UnitreeBody;
-use super::camera::{CameraReceive, PictureSource};
+use super::camera::PictureSource;
 use super::crew::Crew;
-use super::detection::Detection;
 use super::emergency_stop::{EmergencyStopTask, StopBus};
-use super::enrolment::Enrolment;
 use super::filter::Filter;
 use super::imu::{ImuDevice, ImuTask};
-use super::keeper::{Kept as KeptPeople, NamedEnd, keeper};
+use super::keeper::Kept as KeptPeople;
 use super::legs::Legs;
 use super::lidar::LidarReceive;
-use super::messages::{Belt, BeltEnd, Correction, Kept, Looked, Picture, Placed, Scan, belt};
+use super::messages::{Belt, Correction, Kept, Placed, Scan, belt};
 use super::odometry::OdometryTask;
-use super::orders::{self, Desk};
-use super::reception::Reception;
+use super::people::{NoPeople, PeopleDesk};
 use super::record::{Datagram, RecorderTask, Tap};
-use super::roster::Roster;
 use super::settings::{Platform, row};
 use super::signs::SharedSigns;
 use super::slam::SlamTask;
 use super::supervisor::Supervisor;
-use super::tracking::{Audience, Tracking};
-use super::view::View;
-use super::{imu, odometry, record, rows};
+use super::tracking::Audience;
+use super::{imu, odometry, people, record, rows};
 use crate::config::{MotionInput, Settings};
 use crate::exit::Failure;
 use crate::record::RunRecord;
@@ -133,33 +124,6 @@ impl Running {
             Self::Threads(threads) => Crew::own(threads, priority),
         }
     }
-}
-
-/// An order about people is waited for so long: most are carried out with the next picture, one that
-/// points at nobody takes a second of pictures.
-const ORDER_PATIENCE: Duration = Duration::from_secs(3);
-
-/// Where people are told of, and orders about them taken.
-pub struct PeopleDesk {
-    /// Orders.
-    pub desk: Desk,
-    /// Who is in view.
-    pub views: BeltEnd<View>,
-    /// What the known are called; nobody is kept without.
-    pub named: Option<NamedEnd>,
-    /// Whether people can be told apart.
-    pub tells_apart: bool,
-    /// The clock of pictures.
-    pub clock: TaskClock,
-}
-
-/// Why there is none.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NoPeople {
-    /// The settings do not ask for people.
-    NotAskedFor,
-    /// The networks that find them are not there.
-    NoNetworks,
 }
 
 /// The service, ready for an executor.
@@ -425,7 +389,7 @@ where
     table.add(spec, to_slam, gauges, Box::new(task));
 
     let people = match devices.eyes {
-        Some(eyes) => open(eyes, settings, &mut table, &signs),
+        Some(eyes) => people::open(eyes, settings, &mut table, &signs),
         None => Err(NoPeople::NotAskedFor),
     };
 
@@ -454,97 +418,6 @@ where
         people,
         watchdog,
         scan_times,
-    })
-}
-
-/// The tasks behind a camera, and where people are told of.
-fn open(
-    eyes: Eyes,
-    settings: &Settings,
-    table: &mut TaskTable,
-    signs: &SharedSigns,
-) -> Result<PeopleDesk, NoPeople> {
-    signs
-        .model_missing
-        .store(eyes.model_missing, Ordering::Relaxed);
-    let [to_detection, to_tracking] = [0; 2].map(|_| table.bell());
-    // Of pictures only the newest counts.
-    let (pictures, pictures_end) = belt::<Picture>(table, "pictures", 1, &to_detection);
-    let (looked, looked_end) = belt::<Looked>(table, "looked at", 2, &to_tracking);
-    let receive = CameraReceive {
-        camera: eyes.camera,
-        out: pictures,
-        signs: Arc::clone(signs),
-        retry_at: None,
-    };
-    let bell = table.bell();
-    let spec = row(settings, rows::CAMERA_RECEIVE);
-    table.add(spec, bell, vec![], Box::new(receive));
-    let Some(mut people) = eyes.people else {
-        return Err(match eyes.model_missing {
-            true => NoPeople::NoNetworks,
-            false => NoPeople::NotAskedFor,
-        });
-    };
-    let tells_apart = people.observer.appearance().is_some();
-    let nobody = table.bell();
-    let (desk, inbox) = orders::orders(&to_tracking, &nobody, ORDER_PATIENCE);
-    // Of what is known only the newest counts: that the rest goes is no loss, and is not told.
-    let (views, views_end) = belt::<View>(table, "views", 1, &nobody);
-    let (mut acquaintances, mut named) = (None, None);
-    let enrolment = match people.kept {
-        Some(kept) => {
-            let ends = keeper(kept, &to_tracking, &nobody, Arc::clone(signs));
-            let (spec, bell) = (row(settings, rows::KEEPER), table.bell());
-            table.add(spec, bell, vec![], Box::new(ends.keeper));
-            (acquaintances, named) = (Some(ends.acquaintances), Some(ends.named));
-            Some(Enrolment::new(ends.sittings))
-        }
-        None => None,
-    };
-    let reception = Reception {
-        roster: Roster::default(),
-        inbox,
-        acquaintances,
-        enrolment,
-        views,
-        shown: None,
-        said: None,
-        signs: Arc::clone(signs),
-    };
-    let watch = Watch::new(people.observer.even_score(), settings.people.identify);
-    let gauges = vec![pictures_end.full.gauge()];
-    let detection = Detection {
-        observer: people.observer,
-        pictures: pictures_end,
-        out: looked,
-        signs: Arc::clone(signs),
-        count: 0,
-        level: 0,
-    };
-    let spec = row(settings, rows::DETECTION);
-    table.add(spec, to_detection, gauges, Box::new(detection));
-
-    let gauges = vec![looked_end.full.gauge()];
-    let tracking = Tracking {
-        watch,
-        looked: looked_end,
-        last: None,
-        reception,
-        audience: people.audience,
-        latency: table.latency("shutter to target"),
-        clock: table.clock().clone(),
-        signs: Arc::clone(signs),
-        said: None,
-    };
-    let spec = row(settings, rows::TRACKING);
-    table.add(spec, to_tracking, gauges, Box::new(tracking));
-    Ok(PeopleDesk {
-        desk,
-        views: views_end,
-        named,
-        tells_apart,
-        clock: table.clock().clone(),
     })
 }
 

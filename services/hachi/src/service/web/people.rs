@@ -25,8 +25,8 @@ use tracing::info;
 use crate::service::enrolment::{self, Stage};
 use crate::service::keeper::Names;
 use crate::service::orders::{Answer, NoAnswer, NotBegun, Order};
+use crate::service::people::{NoPeople, PeopleDesk};
 use crate::service::view::View;
-use crate::service::wiring::{NoPeople, PeopleDesk};
 
 /// Where it is told.
 pub const PATH: &str = "/people";
@@ -268,8 +268,8 @@ impl PeoplePage {
         guard::check(request).map_err(|refusal| (refusal.status(), refusal.to_string()))
     }
 
-    /// Takes in what tracking and the keeper left.
-    fn hear(&mut self) {
+    /// Takes in what tracking and the keeper left, and lets go what went.
+    pub fn hear(&mut self) {
         let Ok(people) = &mut self.people else { return };
         if let Some(newest) = people.views.full.receive() {
             let before = std::mem::replace(&mut self.view, newest);
@@ -277,6 +277,12 @@ impl PeoplePage {
         }
         if let Some(named) = &people.named {
             if let Some(names) = named.names.newest() {
+                // Why an enrolment failed may hold the name of somebody who is forgotten now.
+                let gone =
+                    |(id, _): &(StoredId, String)| !names.iter().any(|(other, _)| other == id);
+                if self.names.iter().any(gone) {
+                    self.failed = None;
+                }
                 self.names = names;
             }
             self.failed = named.failures.newest().or(self.failed.take());
