@@ -63,11 +63,17 @@ impl Rgb {
         let right = ((b.left + b.width).ceil() as usize).min(columns);
         let bottom = ((b.top + b.height).ceil() as usize).min(rows);
         let (width, height) = (right.checked_sub(left)?, bottom.checked_sub(top)?);
-        let row = |y: usize| &pixels[3 * (y * columns + left)..][..3 * width];
-        (width > 0 && height > 0).then(|| Self {
+        if width == 0 || height == 0 {
+            return None;
+        }
+        let mut cut = Vec::with_capacity(3 * width * height);
+        for y in top..bottom {
+            cut.extend_from_slice(&pixels[3 * (y * columns + left)..][..3 * width]);
+        }
+        Some(Self {
             width,
             height,
-            pixels: (top..bottom).flat_map(|y| row(y).iter().copied()).collect(),
+            pixels: cut,
         })
     }
 

@@ -8,7 +8,9 @@ use hachi_hal::{Point, Pose, ScanHeader, Stamp, Vector3};
 use hachi_odometry::{Estimate, Odometry};
 use hachi_registration::Degeneracy;
 use hachi_slam::ledger::FoundBy;
-use hachi_slam::{LedgerEntry, LoopCounts, Map, NodeId, ScanInput, Slam, SlamEstimate, SlamEvents};
+use hachi_slam::{
+    LedgerEntry, LoopCounts, Map, NodeId, ScanInput, Slam, SlamEstimate, SlamEvents, Visit,
+};
 use hachi_trajectory::Trajectory;
 use tracing::{info, warn};
 
@@ -23,7 +25,9 @@ pub struct SlamStage {
     base_from_lidar: Pose,
     /// The session's scans as odometry placed them.
     scans: Vec<(Stamp, Pose)>,
-    /// Where the last of them was.
+    /// Its submaps that became no node: known places on the path.
+    visits: Vec<Visit>,
+    /// Where the last scan was.
     place: Option<SlamEstimate>,
     conditions: MapConditionCounts,
     points: Vec<Point>,
@@ -44,6 +48,7 @@ impl SlamStage {
             place: None,
             conditions: MapConditionCounts::default(),
             scans: Vec::new(),
+            visits: Vec::new(),
             points: Vec::new(),
             events: SlamEvents::default(),
             store_fails: false,
@@ -106,6 +111,9 @@ impl SlamStage {
             points,
         };
         let placed = self.slam.step(&scan, &mut self.events);
+        if self.keeps_path {
+            self.visits.extend_from_slice(&self.events.visits);
+        }
         self.conditions.count(&placed.condition);
         self.place = Some(placed);
         self.say();
@@ -120,6 +128,9 @@ impl SlamStage {
     /// The end of the run: what is under way is finished and kept.
     pub fn finish(&mut self) {
         self.slam.finish(&mut self.events);
+        if self.keeps_path {
+            self.visits.extend_from_slice(&self.events.visits);
+        }
         self.say();
     }
 
@@ -146,7 +157,7 @@ impl SlamStage {
                 warn!(%error, "the map can't be kept for now; it goes on in memory");
             }
             self.store_fails = true;
-        } else if !self.events.fixed.is_empty() {
+        } else if !self.events.fixed.is_empty() || !self.events.visits.is_empty() {
             self.store_fails = false;
             self.given_up_said = false;
         }
@@ -171,17 +182,10 @@ impl SlamStage {
 
     /// The poses of this session's scans on the map, as known now.
     pub fn trajectory(&self) -> Trajectory {
-        let nodes: Vec<_> = self
-            .slam
-            .map()
-            .nodes()
-            .iter()
-            .filter(|n| n.session == self.slam.session())
-            .copied()
-            .collect();
+        let fixes = hachi_slam::track::fixes(self.slam.map(), self.slam.session(), &self.visits);
         let mut trajectory = Trajectory::new();
         for (stamp, odom_from_base) in &self.scans {
-            let pose = hachi_slam::track::corrected(&nodes, *stamp, odom_from_base)
+            let pose = hachi_slam::track::corrected(&fixes, *stamp, odom_from_base)
                 .unwrap_or(*odom_from_base);
             // Stamps increase, as those of the scans did.
             let _ = trajectory.push(*stamp, pose);

@@ -6,8 +6,8 @@ mod program;
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, Once};
 use std::time::Duration;
 
 use hachi::config::{MotionInput, Settings};
@@ -39,6 +39,38 @@ const PERIOD_NS: i64 = 250 * MS;
 /// A step of virtual time while somebody waits for an answer.
 const STEP_NS: i64 = 50 * MS;
 
+/// Everything that is logged in this process.
+static LOG: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+
+struct Log;
+
+impl Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        LOG.lock().unwrap().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+fn keep_the_log() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        tracing_subscriber::fmt()
+            .with_ansi(false)
+            .with_max_level(tracing::Level::TRACE)
+            .with_writer(|| Log)
+            .init();
+    });
+}
+
+/// What was logged so far.
+fn logged() -> String {
+    String::from_utf8(LOG.lock().unwrap().clone()).unwrap()
+}
+
 /// A service with a camera, and its page.
 struct Rig {
     run: VirtualTime,
@@ -64,6 +96,7 @@ impl Rig {
         patience: Duration,
         room: Option<u64>,
     ) -> Self {
+        keep_the_log();
         let mut settings = Settings::load(Some("b1"), None).unwrap();
         settings.motion = MotionInput::Odometry;
         settings.people.enabled = store.is_some();
@@ -419,6 +452,17 @@ fn whoever_is_enrolled_in_front_of_the_robot_is_known_by_name_when_they_come_bac
     file.forget(&entry).unwrap();
     rig.pass(1.5);
     assert_eq!(rig.people()["known"], json!([]));
+
+    // All of that is in the log, and nobody's name.
+    let log = logged();
+    for line in [
+        "order=\"/people/enrol\" answer=Ok(Begun(1))",
+        "stage=Done",
+        "answer=Ok(Picked",
+    ] {
+        assert!(log.contains(line), "{line}");
+    }
+    assert!(!log.contains("Anna"));
 }
 
 #[test]

@@ -14,6 +14,7 @@ use crate::map::Map;
 use crate::node::{Node, NodeId, PieceId};
 use crate::places::node_of;
 use crate::recognition::{PlaceId, Recognition};
+use crate::uncertainty::largest_sigmas;
 
 /// Half axes of the search ellipsoid where the place is known exactly, metres: what one sees from
 /// there, one sees from here.
@@ -190,12 +191,8 @@ fn nearest(map: &mut Map, node: &Node, own: &Matrix6<f64>, config: &SlamConfig) 
         .min_by(|a, b| a.1.total_cmp(&b.1))?
         .0;
     let since = map.relative_covariance(near, node.id)?;
-    let sigma = |from: usize| {
-        (0..3)
-            .map(|i| since[(from + i, from + i)].max(0.0).sqrt())
-            .fold(0.0, f64::max)
-    };
-    (3.0 * sigma(0) < NEAR_ENOUGH_M && 3.0 * sigma(3) < NEAR_ENOUGH_RAD).then_some(near)
+    let (metres, radians) = largest_sigmas(&since);
+    (3.0 * metres < NEAR_ENOUGH_M && 3.0 * radians < NEAR_ENOUGH_RAD).then_some(near)
 }
 
 /// Whether the way from the one to the other was long enough to be a revisit.

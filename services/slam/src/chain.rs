@@ -8,6 +8,7 @@ use hachi_hal::Pose;
 use nalgebra::Matrix6;
 
 use crate::alignment::{Aligned, Alignment};
+use crate::anchor::Link;
 use crate::ground::laid_on;
 use crate::growing::GrownSubmap;
 use crate::map::Map;
@@ -51,15 +52,23 @@ pub struct ChainAlignment {
 }
 
 impl ChainAlignment {
-    /// Begins; `previous` are the nodes to align with, the last first. `false` if there is nothing
-    /// to align with: then the way alone counts.
-    pub fn begin(&mut self, map: &mut Map, grown: &GrownSubmap, previous: &[NodeId]) -> bool {
+    /// Begins; `previous` are the nodes to align with, the one that odometry hangs on first, and `way`
+    /// leads there from it by odometry. `false` if there is nothing to align with: then the way alone
+    /// counts.
+    pub fn begin(
+        &mut self,
+        map: &mut Map,
+        grown: &GrownSubmap,
+        way: &Link,
+        previous: &[NodeId],
+    ) -> bool {
         let last = previous.first().and_then(|id| map.node(*id)).copied();
-        let (Some((way, covariance)), Some(last)) = (grown.way, last) else {
+        let Some(last) = last else {
             return false;
         };
-        self.expected = way;
-        self.way_information = covariance.information();
+        self.expected = way.pose;
+        self.way_information = way.information();
+        let way = way.pose;
         let map_from_last = last.map_from_node;
         let centre = way.translation.vector.cast::<f32>().into();
         self.target.clear();
@@ -87,15 +96,15 @@ impl ChainAlignment {
         true
     }
 
-    /// A step; the edge from the last node when it is known.
-    pub fn step(&mut self) -> Option<(Pose, Matrix6<f64>)> {
+    /// A step; the way from the first of the nodes when it is known.
+    pub fn step(&mut self) -> Option<Link> {
         let aligned = self.alignment.step(&self.target)?;
         let (found, fitness) = (&aligned.found, &aligned.fitness);
         if !found.converged || fitness.overlap < LEAST_OVERLAP {
-            return Some((self.expected, self.way_information));
+            return Some(link(&self.expected, &self.way_information));
         }
         if fitness.inlier_share() < LEAST_INLIERS {
-            return Some((self.expected, self.way_information * DOUBT));
+            return Some(link(&self.expected, &(self.way_information * DOUBT)));
         }
         let seen = found.degeneracy.projection_on_observed();
         let hessian = seen.transpose() * found.information * seen;
@@ -105,20 +114,27 @@ impl ChainAlignment {
         let apart = (off.transpose() * self.way_information * off)[0];
         if aligned.guess > 0 && self.is_better(&aligned) {
             // The ground was right.
-            return Some((found.target_from_source, of_surfaces));
+            return Some(link(&found.target_from_source, &of_surfaces));
         }
         if apart > ABSURD {
-            return Some((self.expected, self.way_information * DOUBT));
+            return Some(link(&self.expected, &(self.way_information * DOUBT)));
         }
         // The two say the same but for a small step: weighed by what each knows of it.
         let both = of_surfaces + self.way_information;
         let step = invert(&both) * of_surfaces * off;
-        Some((stepped(&self.expected, &step), both))
+        Some(link(&stepped(&self.expected, &step), &both))
     }
 
     /// Whether what the ground led to fits clearly better than what odometry led to.
     fn is_better(&self, aligned: &Aligned) -> bool {
         let fit = |guess| self.alignment.guess_fitness(guess).unwrap_or(0.0);
         fit(aligned.guess) > CLEARLY * fit(0)
+    }
+}
+
+fn link(pose: &Pose, information: &Matrix6<f64>) -> Link {
+    Link {
+        pose: *pose,
+        covariance: invert(information),
     }
 }

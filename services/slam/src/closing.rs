@@ -42,6 +42,10 @@ const AGREEING: usize = 2;
 /// Share of what is seen that has to lie at a place of another piece for it to be looked at closely.
 const LEAST_LIKELY: f64 = 0.35;
 
+/// Nodes follow each other within this many times the way after which one is fixed; between others the
+/// robot passed places that have nodes.
+const FOLLOWS: f64 = 2.0;
+
 /// Loops that wait for others to agree.
 const MOST_WAITING: usize = 16;
 
@@ -80,8 +84,8 @@ impl Closing {
             return false;
         };
         let v = config.loop_submaps as u32;
-        let before = gather(map, &node, v, 0, &mut self.source);
-        let around = gather(map, &old, v, v, &mut self.target);
+        let before = gather(map, &node, v, 0, config, &mut self.source);
+        let around = gather(map, &old, v, v, config, &mut self.target);
         if !before || !around {
             return false;
         }
@@ -277,24 +281,50 @@ fn agrees(map: &Map, a: &LedgerEntry, b: &LedgerEntry) -> bool {
 }
 
 /// Lays a node's neighbours together in its frame: up to `before` before and `after` after it, of its
-/// own session. `false` if its own submap can't be read.
-pub fn gather(map: &mut Map, node: &Node, before: u32, after: u32, out: &mut Surfaces) -> bool {
+/// own session and as far as the robot went on from one to the next without passing known places.
+/// `false` if its own submap can't be read.
+pub fn gather(
+    map: &mut Map,
+    node: &Node,
+    before: u32,
+    after: u32,
+    config: &SlamConfig,
+    out: &mut Surfaces,
+) -> bool {
     out.clear();
-    let first = node.id.0.saturating_sub(before);
-    let mut own = false;
-    for id in first..=node.id.0.saturating_add(after) {
-        let Some(other) = map.node(NodeId(id)).copied() else {
-            continue;
-        };
-        if other.session != node.session || other.piece != node.piece {
-            continue;
-        }
-        let Ok(submap) = map.submap(other.id) else {
+    let Ok(own) = map.submap(node.id) else {
+        return false;
+    };
+    let most_m = FOLLOWS * config.node_every_m(own.voxel_m);
+    let follows = |map: &Map, id: u32, beside: &Node| {
+        let other = map.node(NodeId(id)).copied();
+        other.filter(|other| {
+            other.session == node.session
+                && other.piece == node.piece
+                && (other.path_m - beside.path_m).abs() <= most_m
+        })
+    };
+    let (mut first, mut last) = (*node, *node);
+    while node.id.0 - first.id.0 < before
+        && let Some(other) = first
+            .id
+            .0
+            .checked_sub(1)
+            .and_then(|id| follows(map, id, &first))
+    {
+        first = other;
+    }
+    while last.id.0 - node.id.0 < after
+        && let Some(other) = follows(map, last.id.0.saturating_add(1), &last)
+    {
+        last = other;
+    }
+    for id in (first.id.0..=last.id.0).map(NodeId) {
+        let (Some(other), Ok(submap)) = (map.node(id).copied(), map.submap(id)) else {
             continue;
         };
         let node_from_other = node.map_from_node.inv_mul(&other.map_from_node);
         out.add(&submap, &node_from_other, [0.0; 3], REACH_M);
-        own |= other.id == node.id;
     }
-    own
+    true
 }

@@ -24,6 +24,9 @@ pub struct SlamConfig {
     pub loop_least_overlap: f64,
     /// Of these, the share that has to lie on the candidate's.
     pub loop_least_inliers: f64,
+    /// Whether a submap that existing nodes cover becomes no node: the map then grows with the space,
+    /// not with time.
+    pub reuse_nodes: bool,
     /// Memory for submaps; the others are read from where the map is kept.
     pub submap_memory_mb: usize,
     /// How odometry errs.
@@ -41,8 +44,18 @@ impl Default for SlamConfig {
             loop_least_way_m: 15.0,
             loop_least_overlap: 0.5,
             loop_least_inliers: 0.7,
+            reuse_nodes: true,
             submap_memory_mb: 64,
             odometry_noise: OdometryNoise::default(),
         }
+    }
+}
+
+impl SlamConfig {
+    /// The way after which a node is fixed where submaps have cubes of this edge, metres.
+    pub fn node_every_m(&self, voxel_m: f32) -> f64 {
+        // Cubes grow with the distances seen; ten of them are a step that shows something new.
+        let by_scene = (10.0 * f64::from(voxel_m)).clamp(1.5, 5.0);
+        self.node_every_m.unwrap_or(by_scene)
     }
 }

@@ -9,6 +9,7 @@ use hachi_registration::{Aligner, AlignerConfig, Kernel, Solver, SurfacePoint};
 
 use crate::alignment::{OPEN_SHARE, judge};
 use crate::closing::gather;
+use crate::config::SlamConfig;
 use crate::map::Map;
 use crate::node::NodeId;
 use crate::surfaces::Surfaces;
@@ -82,7 +83,14 @@ impl Confirmation {
     }
 
     /// Looks: `points` in the base's frame, `session` the present one.
-    pub fn look(&mut self, map: &mut Map, map_from_base: &Pose, session: u32, points: &[Point]) {
+    pub fn look(
+        &mut self,
+        map: &mut Map,
+        map_from_base: &Pose,
+        session: u32,
+        points: &[Point],
+        config: &SlamConfig,
+    ) {
         let here = map_from_base.translation.vector;
         let distance = |pose: &Pose| (pose.translation.vector - here).norm();
         let old = map
@@ -96,7 +104,7 @@ impl Confirmation {
             return;
         };
         if self.around != Some(old.id) {
-            if !gather(map, &old, NODES, NODES, &mut self.target) {
+            if !gather(map, &old, NODES, NODES, config, &mut self.target) {
                 return;
             }
             self.target.index();

@@ -6,6 +6,7 @@
 use hachi_hal::{Pose, Stamp, Vector3};
 use hachi_odometry::Condition;
 
+use crate::anchor::Link;
 use crate::config::SlamConfig;
 use crate::ground::GroundSeeker;
 use crate::input::ScanInput;
@@ -41,7 +42,7 @@ pub struct GrownSubmap {
     pub ground: Option<Ground>,
     /// Takes points of its frame to that of the submap before it, by odometry; with how surely.
     /// `None` for the first of a piece.
-    pub way: Option<(Pose, WayCovariance)>,
+    pub way: Option<Link>,
 }
 
 /// The submap that is growing.
@@ -56,7 +57,7 @@ pub struct Growing {
     /// From the frame of the growing submap to the present scan.
     way: WayCovariance,
     /// How the growing submap hangs on the one before.
-    hangs: Option<(Pose, WayCovariance)>,
+    hangs: Option<Link>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -171,9 +172,7 @@ impl Growing {
             return true;
         }
         let turned = begun.odom_from_first.rotation.angle_to(&last.rotation);
-        // Cubes grow with the distances seen; ten of them are a step that shows something new.
-        let by_scene = (10.0 * f64::from(self.builder.voxel_m())).clamp(1.5, 5.0);
-        let every_m = config.node_every_m.unwrap_or(by_scene);
+        let every_m = config.node_every_m(self.builder.voxel_m());
         self.path_m - begun.path_m >= every_m || turned >= config.node_every_rad
     }
 
@@ -184,7 +183,10 @@ impl Growing {
         self.begin(scan, up);
         let begun = self.begun?;
         let last_from_this = grown.odom_from_node.inv_mul(&begun.odom_from_node);
-        self.hangs = Some((last_from_this, way));
+        self.hangs = Some(Link {
+            pose: last_from_this,
+            covariance: way.covariance(),
+        });
         Some(grown)
     }
 

@@ -44,9 +44,22 @@ pub struct SlamEstimate {
     pub condition: SlamCondition,
     /// The piece of map that `map_from_base` is on; `None` before the first node.
     pub piece: Option<PieceId>,
-    /// The last fixed node, and where the base was seen from it by odometry: what is needed to place
-    /// this scan again when the node has moved. `None` before the first node.
+    /// The node that odometry hangs on, and where the base was seen from it by odometry: what is needed
+    /// to place this scan again when the node has moved. `None` before the first node.
     pub anchor: Option<(NodeId, Pose)>,
+}
+
+/// A submap that existing nodes cover: it became no node, and the robot was here all the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Visit {
+    /// The end of its first scan.
+    pub stamp: Stamp,
+    /// Its frame, as odometry had it.
+    pub odom_from_submap: Pose,
+    /// The node that covers it.
+    pub node: NodeId,
+    /// Its frame as seen from the node.
+    pub node_from_submap: Pose,
 }
 
 /// What a step brought besides the pose.
@@ -54,6 +67,8 @@ pub struct SlamEstimate {
 pub struct SlamEvents {
     /// Nodes that were fixed.
     pub fixed: Vec<NodeId>,
+    /// Submaps that became no node.
+    pub visits: Vec<Visit>,
     /// Ledger entries that are new, or were decided anew.
     pub ledger: Vec<LedgerEntry>,
     /// Whether old nodes moved.
@@ -70,6 +85,7 @@ impl SlamEvents {
     /// Empties it, keeping its memory.
     pub fn clear(&mut self) {
         self.fixed.clear();
+        self.visits.clear();
         self.ledger.clear();
         self.moved = false;
         self.joined.clear();

@@ -31,15 +31,19 @@ pub enum FoundBy {
     Recognition,
     /// Somebody, or another program, said so.
     Proposal,
+    /// A submap that became no node was laid on the candidate; `node` is what it followed, or what
+    /// followed it.
+    Coverage,
 }
 
 impl FoundBy {
     /// All of them.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::Nearness,
         Self::Looks,
         Self::Recognition,
         Self::Proposal,
+        Self::Coverage,
     ];
 
     /// The word for it in files.
@@ -49,6 +53,7 @@ impl FoundBy {
             Self::Looks => "looks",
             Self::Recognition => "recognition",
             Self::Proposal => "proposal",
+            Self::Coverage => "coverage",
         }
     }
 }
@@ -75,11 +80,13 @@ pub enum Refusal {
     Unreadable,
     /// Newer nodes needed the time.
     NoTime,
+    /// The node has loops to that place already.
+    Redundant,
 }
 
 impl Refusal {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::NotConverged,
         Self::LittleOverlap,
         Self::PoorFit,
@@ -89,6 +96,7 @@ impl Refusal {
         Self::Ambiguous,
         Self::Unreadable,
         Self::NoTime,
+        Self::Redundant,
     ];
 
     /// The word for it in files.
@@ -103,6 +111,7 @@ impl Refusal {
             Self::Ambiguous => "ambiguous",
             Self::Unreadable => "unreadable",
             Self::NoTime => "no_time",
+            Self::Redundant => "redundant",
         }
     }
 }
@@ -186,7 +195,7 @@ pub struct LedgerEntry {
     /// Squared Mahalanobis distance between alignment and graph, of six degrees of freedom less the
     /// open ones.
     pub chi2: f32,
-    /// Other loops that agree with it.
+    /// Other loops that agree with it, and submaps since that said the same again and became no node.
     pub agreeing: u16,
     /// Takes points of the node's frame to the candidate's, by alignment.
     pub candidate_from_node: Pose,

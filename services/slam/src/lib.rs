@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod alignment;
+pub mod anchor;
 pub mod cache;
 pub mod candidates;
 pub mod chain;
@@ -10,6 +11,7 @@ pub mod codec;
 pub mod condition;
 pub mod config;
 pub mod confirmation;
+pub mod covering;
 pub mod edge;
 pub mod graph;
 pub mod grid;
@@ -36,7 +38,7 @@ pub mod work;
 
 pub use condition::{SlamCondition, SlamDoubt};
 pub use config::SlamConfig;
-pub use input::{ScanInput, SlamEstimate, SlamEvents};
+pub use input::{ScanInput, SlamEstimate, SlamEvents, Visit};
 pub use ledger::{LedgerEntry, LoopCounts, LoopId, Verdict};
 pub use map::Map;
 pub use node::{Node, NodeId, PieceId};

@@ -7,6 +7,7 @@ use hachi_hal::{Pose, Vector3};
 use hachi_odometry::{Condition, Doubt};
 use nalgebra::Matrix6;
 
+use crate::anchor::Anchor;
 use crate::condition::{SlamCondition, SlamDoubt};
 use crate::config::SlamConfig;
 use crate::confirmation::Confirmation;
@@ -19,7 +20,7 @@ use crate::node::NodeId;
 use crate::saved::SavedMap;
 use crate::store::{MemoryStore, SubmapStore};
 use crate::uncertainty::invert;
-use crate::work::{Work, Workshop};
+use crate::work::{Pace, Work, Workshop};
 
 /// Submaps that may wait for their work; a further one is worked off at once.
 const MOST_WAITING: usize = 2;
@@ -109,7 +110,7 @@ impl Slam {
             self.hand_over(rest, events);
             return self.estimate(scan);
         }
-        let alone = self.workshop.is_floating(&self.map) && self.workshop.last().is_none();
+        let alone = self.workshop.is_floating(&self.map) && self.workshop.anchor().is_none();
         let full = self.growing.is_full(alone, &self.config);
         if full {
             let grown = self.growing.take(scan, &up);
@@ -145,8 +146,13 @@ impl Slam {
         self.confirmation.count(events.fixed.len());
         let map_from_base = self.map_from_odom * scan.odom_from_base;
         let session = self.workshop.session();
-        self.confirmation
-            .look(&mut self.map, &map_from_base, session, scan.points);
+        self.confirmation.look(
+            &mut self.map,
+            &map_from_base,
+            session,
+            scan.points,
+            &self.config,
+        );
     }
 
     /// The end of a run: fixes what has grown, checks what is to be checked, keeps everything.
@@ -260,10 +266,13 @@ impl Slam {
             if !self.workshop.is_busy() {
                 return;
             }
-            let hurry = !self.waiting.is_empty();
+            let pace = Pace {
+                hurry: !self.waiting.is_empty(),
+                reuse: self.config.reuse_nodes && !self.confirmation.is_due(),
+            };
             match self
                 .workshop
-                .step(&mut self.map, hurry, &self.config, events)
+                .step(&mut self.map, pace, &self.config, events)
             {
                 Work::Going => {}
                 Work::Moved => self.take_over(),
@@ -276,24 +285,27 @@ impl Slam {
 
     /// The anchor is new, or has moved.
     fn take_over(&mut self) {
-        let Some(node) = self.anchor().and_then(|id| self.map.node(id)).copied() else {
+        let Some(anchor) = self.anchor().copied() else {
             return;
         };
-        self.map_from_odom = node.map_from_node * node.odom_from_node.inverse();
-        if let Some(covariance) = self.map.covariance(node.id) {
-            self.covariance = covariance;
+        let Some(map_from_node) = self.map.node(anchor.node).map(|n| n.map_from_node) else {
+            return;
+        };
+        self.map_from_odom = map_from_node * anchor.odom_from_node.inverse();
+        if let Some(covariance) = self.map.covariance(anchor.node) {
+            self.covariance = covariance + anchor.to_submap.covariance;
         }
     }
 
-    fn anchor(&self) -> Option<NodeId> {
-        self.workshop.last().filter(|_| !self.adrift)
+    fn anchor(&self) -> Option<&Anchor> {
+        self.workshop.anchor().filter(|_| !self.adrift)
     }
 
     fn estimate(&self, scan: &ScanInput<'_>) -> SlamEstimate {
-        let anchor = self.anchor().and_then(|id| self.map.node(id));
-        let since = anchor.map(|node| {
-            let node_from_base = node.odom_from_node.inv_mul(&scan.odom_from_base);
-            (node.id, node_from_base)
+        let anchor = self.anchor();
+        let since = anchor.map(|anchor| {
+            let node_from_base = anchor.odom_from_node.inv_mul(&scan.odom_from_base);
+            (anchor.node, node_from_base)
         });
         SlamEstimate {
             stamp: scan.stamp,
@@ -301,7 +313,7 @@ impl Slam {
             map_from_base: self.map_from_odom * scan.odom_from_base,
             covariance: self.covariance + invert(&self.growing.way().information()),
             condition: self.condition(&scan.condition),
-            piece: anchor.map(|node| node.piece),
+            piece: anchor.and_then(|a| self.map.node(a.node)).map(|n| n.piece),
             anchor: since,
         }
     }

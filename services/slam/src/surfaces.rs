@@ -71,6 +71,11 @@ impl Surfaces {
         self.tree.build(&self.positions);
     }
 
+    /// Whether there is a surface within so many metres.
+    pub fn is_near(&self, point: [f32; 3], metres: f32) -> bool {
+        self.tree.nearest(point, metres * metres).is_some()
+    }
+
     /// All surfaces.
     pub fn points(&self) -> &[SurfacePoint] {
         &self.points

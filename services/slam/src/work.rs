@@ -1,8 +1,10 @@
-//! What a finished submap brings, cut into steps: it is aligned and becomes a node, its place is
-//! looked for among the known ones, candidates are proven, loops close.
+//! What a finished submap brings, cut into steps: it is aligned and becomes a node, or is covered by
+//! one; a node's place is looked for among the known ones, candidates are proven, loops close.
 //!
 //! Steps are of about equal size and their number is fixed for each scan, so that no scan's pose is
 //! late because of a loop, and the same scans give the same map.
+
+mod visits;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -10,10 +12,13 @@ use std::sync::Arc;
 use hachi_hal::Pose;
 use nalgebra::Matrix6;
 
+use crate::anchor::{Anchor, Link};
 use crate::candidates::{Candidate, candidates, recognised};
 use crate::chain::ChainAlignment;
 use crate::closing::Closing;
 use crate::config::SlamConfig;
+use crate::covering::Covering;
+use crate::edge::EdgeKind;
 use crate::growing::GrownSubmap;
 use crate::input::SlamEvents;
 use crate::ledger::{FoundBy, LedgerEntry, LoopId, Refusal, Verdict};
@@ -27,6 +32,10 @@ const USUAL_GROUND_M: f32 = 0.5;
 /// Proposals that wait to be checked.
 const MOST_PROPOSED: usize = 64;
 
+/// So many loops of a node to nodes this close to each other are enough, metres.
+const LOOPS_ENOUGH: usize = 2;
+const ONE_PLACE_M: f64 = 4.0;
+
 /// What a step did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
@@ -36,14 +45,27 @@ pub enum Work {
     Moved,
 }
 
+/// How a step is made.
+#[derive(Debug, Clone, Copy)]
+pub struct Pace {
+    /// Candidates are left unproven: a node more matters more than a loop more.
+    pub hurry: bool,
+    /// Submaps that nodes cover become none.
+    pub reuse: bool,
+}
+
 #[derive(Debug, Default)]
 enum Stage {
     #[default]
     Idle,
     /// The submap is being laid on those before it.
     Aligning(Box<GrownSubmap>),
-    /// It hangs there; it becomes a node.
-    Fixing(Box<GrownSubmap>, Option<(Pose, Matrix6<f64>)>),
+    /// It hangs there; it is looked for nodes that cover it.
+    Chained(Box<GrownSubmap>, Link),
+    /// It is laid on them.
+    Covering(Box<GrownSubmap>, Link),
+    /// It becomes a node.
+    Fixing(Box<GrownSubmap>, Option<Link>),
     /// Its place is looked for.
     Looking(NodeId),
     /// Candidates are proven one by one.
@@ -65,11 +87,14 @@ enum Stage {
 pub struct Workshop {
     stage: Stage,
     chain: ChainAlignment,
+    covering: Covering,
     closing: Closing,
     recognition: Recognition,
     found: Vec<Candidate>,
     proposed: VecDeque<(NodeId, Candidate)>,
-    /// The nodes of the present piece that were fixed since it began, the last first; a few.
+    /// What odometry hangs on.
+    anchor: Option<Anchor>,
+    /// The nodes of the present piece that it hung on since that began, the last first; a few.
     recent: VecDeque<NodeId>,
     piece: Option<PieceId>,
     session: u32,
@@ -88,6 +113,7 @@ impl Workshop {
         match &self.stage {
             Stage::Idle => "idle",
             Stage::Aligning(_) => "aligning",
+            Stage::Chained(..) | Stage::Covering(..) => "covering",
             Stage::Fixing(..) => "fixing",
             Stage::Looking(_) => "looking",
             Stage::Proving { .. } => "laying out",
@@ -103,6 +129,12 @@ impl Workshop {
     /// Another run of the robot: what it sees hangs on nothing at first.
     pub fn begin_session(&mut self, session: u32) {
         self.session = session;
+        self.forget();
+    }
+
+    /// Odometry hangs on nothing any more.
+    fn forget(&mut self) {
+        self.anchor = None;
         self.recent.clear();
         self.piece = None;
         self.recognition.clear();
@@ -129,9 +161,9 @@ impl Workshop {
         self.proposed.push_back((node, candidate));
     }
 
-    /// The last node that was fixed, if odometry still hangs on it.
-    pub fn last(&self) -> Option<NodeId> {
-        self.recent.front().copied()
+    /// What odometry hangs on.
+    pub fn anchor(&self) -> Option<&Anchor> {
+        self.anchor.as_ref()
     }
 
     /// Whether the present piece hangs on nothing though there is another map.
@@ -157,9 +189,7 @@ impl Workshop {
     ) {
         self.map_from_odom = *map_from_odom;
         if grown.way.is_none() {
-            self.recent.clear();
-            self.piece = None;
-            self.recognition.clear();
+            self.forget();
         }
         let previous: Vec<NodeId> = self
             .recent
@@ -167,19 +197,21 @@ impl Workshop {
             .take(config.chain_submaps)
             .copied()
             .collect();
-        self.stage = if self.chain.begin(map, &grown, &previous) {
-            Stage::Aligning(Box::new(grown))
-        } else {
-            let way = grown.way.map(|(way, c)| (way, c.information()));
-            Stage::Fixing(Box::new(grown), way)
+        let way = self.anchor.zip(grown.way);
+        let way = way.map(|(anchor, way)| anchor.to_submap.then(&way));
+        self.stage = match way {
+            Some(way) if self.chain.begin(map, &grown, &way, &previous) => {
+                Stage::Aligning(Box::new(grown))
+            }
+            way => Stage::Fixing(Box::new(grown), way),
         };
     }
 
-    /// One step. In a hurry candidates are left unproven: a node more matters more than a loop more.
+    /// One step.
     pub fn step(
         &mut self,
         map: &mut Map,
-        hurry: bool,
+        pace: Pace,
         config: &SlamConfig,
         events: &mut SlamEvents,
     ) -> Work {
@@ -193,9 +225,27 @@ impl Workshop {
             }
             Stage::Aligning(grown) => {
                 self.stage = match self.chain.step() {
+                    Some(edge) if pace.reuse => Stage::Chained(grown, edge),
                     Some(edge) => Stage::Fixing(grown, Some(edge)),
                     None => Stage::Aligning(grown),
                 };
+                Work::Going
+            }
+            Stage::Chained(grown, edge) => {
+                if self.may_be_covered(&grown, &edge, map, config) {
+                    self.stage = Stage::Covering(grown, edge);
+                    return Work::Going;
+                }
+                self.fix(*grown, Some(edge), map, config, events)
+            }
+            Stage::Covering(grown, edge) => {
+                match self.covering.step(map) {
+                    Some(Some(covered)) => {
+                        return self.visit(&grown, &edge, &covered, map, config, events);
+                    }
+                    Some(None) => self.stage = Stage::Fixing(grown, Some(edge)),
+                    None => self.stage = Stage::Covering(grown, edge),
+                }
                 Work::Going
             }
             Stage::Fixing(grown, edge) => self.fix(*grown, edge, map, config, events),
@@ -204,7 +254,7 @@ impl Workshop {
                 Work::Going
             }
             Stage::Proving { node, rest } => {
-                self.prove_next(node, rest, map, hurry, config, events)
+                self.prove_next(node, rest, map, pace.hurry, config, events)
             }
             Stage::Aligned {
                 node,
@@ -219,18 +269,16 @@ impl Workshop {
     fn fix(
         &mut self,
         grown: GrownSubmap,
-        edge: Option<(Pose, Matrix6<f64>)>,
+        edge: Option<Link>,
         map: &mut Map,
         config: &SlamConfig,
         events: &mut SlamEvents,
     ) -> Work {
         let piece = *self.piece.get_or_insert_with(|| map.begin_piece());
-        let last = self.recent.front().and_then(|id| map.node(*id)).copied();
-        let edge = last.zip(edge);
-        let map_from_node = edge.as_ref().map_or_else(
-            || self.map_from_odom * grown.odom_from_node,
-            |(last, (last_from_node, _))| last.map_from_node * last_from_node,
-        );
+        let hangs = self.anchor.zip(edge);
+        let map_from_node = hangs
+            .and_then(|(anchor, edge)| Some(map.node(anchor.node)?.map_from_node * edge.pose))
+            .unwrap_or_else(|| self.map_from_odom * grown.odom_from_node);
         let ground = grown.ground.or(self.ground);
         self.ground = ground;
         let ground = ground.unwrap_or(Ground::level(USUAL_GROUND_M));
@@ -239,7 +287,7 @@ impl Workshop {
             id,
             session: self.session,
             piece,
-            chained: edge.is_some(),
+            chained: hangs.is_some(),
             stamp: grown.stamp,
             odom_from_node: grown.odom_from_node,
             map_from_node,
@@ -247,15 +295,25 @@ impl Workshop {
             ground,
         };
         map.places.describe(&grown.submap, &ground);
-        let edge = edge.map(|(last, (pose, information))| (last.id, pose, information));
+        let way = grown.way;
+        let edge = hangs.map(|(anchor, edge)| {
+            let chain = match way {
+                // The node before is one that it did not become: by odometry alone.
+                Some(way) if !anchor.is_made() => anchor.made_to_submap.then(&way),
+                _ => edge,
+            };
+            (anchor.made, chain.pose, chain.information())
+        });
         if let Err(error) = map.add_node(node, Arc::new(grown.submap), edge) {
             events.graph_errors.push(error);
             return Work::Going;
         }
+        if let Some((anchor, edge)) = hangs.filter(|(anchor, _)| !anchor.is_made()) {
+            self.tie(id, anchor.node, node.stamp, &edge, None, map, events);
+        }
         self.keep(map, events);
         events.fixed.push(id);
-        self.recent.push_front(id);
-        self.recent.truncate(config.chain_submaps.max(1));
+        self.hang_on(Anchor::made(id, &grown.odom_from_node), config);
         if config.close_loops {
             self.stage = Stage::Looking(id);
         }
@@ -296,7 +354,10 @@ impl Workshop {
         // Places that were thought of before and challengers are asked even so: without that nothing is
         // ever decided.
         let must = candidate.proposed.is_some() || self.recognition.asks_everywhere();
-        if hurry && !must {
+        if !must && is_redundant(map, node, candidate.node) {
+            refuse(map, entry, Refusal::Redundant, events);
+            self.stage = Stage::Proving { node, rest };
+        } else if hurry && !must {
             refuse(map, entry, Refusal::NoTime, events);
             self.stage = Stage::Proving { node, rest };
         } else if self.closing.begin(map, &mut entry, &candidate, config) {
@@ -433,6 +494,24 @@ impl Workshop {
             events.store_errors.push(error);
         }
     }
+}
+
+/// Whether a node has loops enough to a place: another would say nothing new.
+fn is_redundant(map: &Map, node: NodeId, candidate: NodeId) -> bool {
+    let Some(place) = map.node(candidate).map(|n| n.map_from_node) else {
+        return false;
+    };
+    let near = |id: NodeId| {
+        map.node(id).is_some_and(|other| {
+            let apart = other.map_from_node.translation.vector - place.translation.vector;
+            apart.norm() <= ONE_PLACE_M
+        })
+    };
+    let loops = map.edges().iter().filter(|e| {
+        matches!(e.kind, EdgeKind::Loop(_))
+            && ((e.first == node && near(e.second)) || (e.second == node && near(e.first)))
+    });
+    loops.count() >= LOOPS_ENOUGH
 }
 
 fn refuse(map: &mut Map, mut entry: LedgerEntry, refusal: Refusal, events: &mut SlamEvents) {

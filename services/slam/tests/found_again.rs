@@ -26,7 +26,7 @@ fn a_round_closes_and_a_false_loop_is_refused_or_outvoted_and_named() {
     let (metres, _) = walker.off_m(&estimate);
     let odometry_m = {
         let truth = ring::truth(0.5).inv_mul(&ring::truth(walker.way_m));
-        let off = truth.inv_mul(&walker.odom());
+        let off = truth.inv_mul(&walker.odom_from_base);
         off.translation.vector.norm()
     };
     assert!(odometry_m > 0.3, "odometry drifts: {odometry_m}");

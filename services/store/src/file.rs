@@ -12,7 +12,7 @@ use rusqlite::{Connection, OpenFlags, OptionalExtension, Transaction, params};
 use crate::error::MapError;
 use crate::load::load;
 use crate::rows::{column, matrix_bytes, pose_bytes};
-use crate::schema::{self, APPLICATION_ID, TABLES, VERSION};
+use crate::schema::{self, APPLICATION_ID, OLDEST, TABLES, VERSION};
 
 /// Who makes a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -117,6 +117,8 @@ impl MapFile {
         check_kind(&connection, path)?;
         if access == Access::Write {
             write_safely(&connection).map_err(problem)?;
+            let version = connection.pragma_update(None, "user_version", VERSION);
+            version.map_err(problem)?;
         }
         let about = |key: &str| -> Result<String, MapError> {
             connection
@@ -317,7 +319,7 @@ fn check_kind(connection: &Connection, path: &Path) -> Result<(), MapError> {
         });
     }
     let found = number("user_version")?;
-    if found != VERSION {
+    if !(OLDEST..=VERSION).contains(&found) {
         return Err(MapError::Version {
             path: path.to_owned(),
             found,

@@ -7,8 +7,12 @@ use rusqlite::limits::Limit;
 /// Says in the file's header that it is a map: "HACM".
 pub(crate) const APPLICATION_ID: i64 = 0x4841_434d;
 
-/// The tables' version. A change that older programs can't read adds one.
-pub(crate) const VERSION: i64 = 2;
+/// The tables' version. A change that older programs can't read adds one. Of 3 are the words `coverage`
+/// and `redundant` in the ledger; all that is in files of version 2 is understood.
+pub(crate) const VERSION: i64 = 3;
+
+/// The oldest version that is read; a file that is opened to be written gets the present one.
+pub(crate) const OLDEST: i64 = 2;
 
 /// The largest value of one column, bytes: a submap has 60 kB.
 pub(crate) const LARGEST_VALUE: i32 = 1 << 20;

@@ -266,6 +266,25 @@ fn what_is_no_map_of_ours_is_refused_with_what_to_do() {
     assert!(matches!(error, MapError::ReadOnly { .. }), "{error:?}");
     drop(read_only);
 
+    // An older program's file is read, and is this one's once it is gone on with.
+    let version = |set: Option<i64>| -> i64 {
+        let file = rusqlite::Connection::open(path("ours.map")).unwrap();
+        if let Some(version) = set {
+            file.pragma_update(None, "user_version", version).unwrap();
+        }
+        file.pragma_query_value(None, "user_version", |row| row.get(0))
+            .unwrap()
+    };
+    version(Some(2));
+    let older = MapFile::open(&path("ours.map"), Access::Read).unwrap();
+    assert_eq!(older.load().unwrap().nodes.len(), 4);
+    drop(older);
+    drop(MapFile::open(&path("ours.map"), Access::Write).unwrap());
+    assert_eq!(version(None), 3);
+    version(Some(1));
+    let oldest = refused("ours.map");
+    assert!(matches!(oldest, MapError::Version { found: 1, .. }));
+
     let newer = rusqlite::Connection::open(path("ours.map")).unwrap();
     newer.pragma_update(None, "user_version", 9).unwrap();
     drop(newer);

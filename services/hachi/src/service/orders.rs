@@ -2,7 +2,7 @@
 //!
 //! In: an [`Order`] at the desk. Out: its [`Answer`], or that there is none in time. An order waits in a
 //! bounded queue; neither end ever waits for the other inside a lock. One that nobody took in time is
-//! withdrawn, so that what was said not to be done is not done later: a [`Ticket`] goes with it, which
+//! withdrawn, so that what was said not to be done is not done later: a `Ticket` goes with it, which
 //! one of the two ends takes for good.
 
 use std::sync::Arc;

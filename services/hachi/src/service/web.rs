@@ -6,6 +6,8 @@
 //! What a request is, and what it may not be, is `hachi_http`'s.
 
 pub mod people;
+pub mod sentences;
+pub mod shapes;
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -154,7 +156,11 @@ pub fn serve(listener: &TcpListener, page: &mut Page, stop: &AtomicBool) {
                 // A caller that goes away is its own matter.
                 let _ = answer(caller, page);
             }
-            Err(_) => std::thread::sleep(LOOK_UP),
+            Err(_) => {
+                // Names that are forgotten go, whether somebody asks or not.
+                page.people.hear();
+                std::thread::sleep(LOOK_UP);
+            }
         }
     }
 }

@@ -124,6 +124,29 @@ impl Map {
         Ok(self.accept(loops))
     }
 
+    /// The edges between two nodes.
+    pub fn ties(&self, a: NodeId, b: NodeId) -> impl Iterator<Item = &Edge> {
+        self.edges
+            .iter()
+            .filter(move |e| (e.first, e.second) == (a, b) || (e.first, e.second) == (b, a))
+    }
+
+    /// Whether a loop between two nodes was vetoed or outvoted: they are tied by it no more.
+    pub fn is_contested(&self, a: NodeId, b: NodeId) -> bool {
+        self.ledger.iter().any(|l| {
+            matches!(l.verdict, Verdict::Vetoed | Verdict::Outvoted)
+                && ((l.node, l.candidate) == (a, b) || (l.node, l.candidate) == (b, a))
+        })
+    }
+
+    /// A loop was measured once more, with the same result.
+    pub fn agrees(&mut self, id: LoopId) {
+        if let Some(entry) = self.ledger.get_mut(id.0 as usize) {
+            entry.agreeing = entry.agreeing.saturating_add(1);
+            self.pending.ledger.push(id);
+        }
+    }
+
     /// The edges that loops are, numbered on.
     fn loop_edges(&self, loops: &[(LoopId, Matrix6<f64>)]) -> Vec<Edge> {
         let known = loops.iter().filter_map(|(loop_id, information)| {

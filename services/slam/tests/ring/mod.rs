@@ -110,10 +110,11 @@ pub fn truth(way_m: f64) -> Pose {
 pub struct Walker {
     pub slam: Slam,
     pub events: SlamEvents,
-    boxes: Vec<[Vector3; 2]>,
+    pub boxes: Vec<[Vector3; 2]>,
     points: Vec<Point>,
     pub way_m: f64,
-    odom_from_base: Pose,
+    /// Where odometry has it.
+    pub odom_from_base: Pose,
     scans: i64,
     /// What odometry adds to each step.
     drift: Pose,
@@ -134,11 +135,6 @@ impl Walker {
                 Rotation::from_euler_angles(0.0, 0.0, 0.00012),
             ),
         }
-    }
-
-    /// Where odometry has it.
-    pub fn odom(&self) -> Pose {
-        self.odom_from_base
     }
 
     /// Lifted and put down elsewhere: odometry begins anew.

@@ -1,5 +1,7 @@
 //! `hachi map info`: what is in a map.
 
+use std::collections::BTreeMap;
+
 use hachi_slam::LoopCounts;
 use hachi_slam::saved::SavedMap;
 use serde::Serialize;
@@ -19,7 +21,7 @@ struct Info {
     pieces: usize,
     edges: usize,
     loops: crate::report::LoopCounts,
-    /// Length of the way through all sessions, metres.
+    /// Length of the way through all sessions until their last nodes, metres.
     path_length_m: f64,
     /// Extent of the nodes' places, metres: x, y, z.
     size_m: [f64; 3],
@@ -71,13 +73,13 @@ fn pieces(saved: &SavedMap) -> usize {
 }
 
 fn path_length_m(saved: &SavedMap) -> f64 {
-    let step = |pair: &[hachi_slam::Node]| {
-        let chained = pair[1].chained && pair[1].session == pair[0].session;
-        let apart =
-            pair[1].map_from_node.translation.vector - pair[0].map_from_node.translation.vector;
-        if chained { apart.norm() } else { 0.0 }
-    };
-    saved.nodes.windows(2).map(step).sum()
+    // Where the map was known already, the robot made no nodes, and counted its way all the same.
+    let mut longest: BTreeMap<u32, f64> = BTreeMap::new();
+    for node in &saved.nodes {
+        let way_m = longest.entry(node.session).or_default();
+        *way_m = way_m.max(node.path_m);
+    }
+    longest.values().sum()
 }
 
 fn size_m(saved: &SavedMap) -> [f64; 3] {

@@ -2,20 +2,22 @@
 //!
 //! The service does it; this shows how far it is, and ends it where the user does.
 
+use std::time::Duration;
+
 use serde::Serialize;
 
 use crate::cli::people::enrolled::PeopleEnrolArguments;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::service::enrolment::Stage;
-use crate::service::web::people::{
+use crate::service::web::shapes::{
     BareOrder, BegunStatus, CancelledStatus, EnrolOrder, EnrolmentStatus, People,
 };
 use crate::service_link::ServiceLink;
 use crate::{output, progress};
 
-/// From one look at the progress to the next, in tenths of a second.
-const REFRESH_TENTHS: u32 = 2;
+/// From one look at the progress to the next.
+const REFRESH: Duration = Duration::from_millis(200);
 
 #[derive(Debug, Serialize)]
 struct Summary {
@@ -39,11 +41,16 @@ pub fn run(arguments: &PeopleEnrolArguments) -> Result<(), Failure> {
     };
     let begun: BegunStatus = link.post("/people/enrol", &order)?;
     let bar = progress::bar(Some(begun.wanted as u64), "looks");
+    let mut too_late = false;
     let ended = loop {
-        if cancelled.is_cancelled() {
-            bar.finish_and_clear();
-            let _: CancelledStatus = link.post("/people/cancel", &BareOrder {})?;
-            return Err(Failure::Interrupted("nobody was enrolled".to_owned()));
+        if cancelled.is_cancelled() && !too_late {
+            let CancelledStatus { cancelled } = link.post("/people/cancel", &BareOrder {})?;
+            if cancelled {
+                bar.finish_and_clear();
+                return Err(Failure::Interrupted("nobody was enrolled".to_owned()));
+            }
+            // They are being kept already: what becomes of that is said.
+            too_late = true;
         }
         let people: People = link.get("/people")?;
         let ours = people.enrolment.filter(|e| e.number >= begun.enrolment);
@@ -54,7 +61,7 @@ pub fn run(arguments: &PeopleEnrolArguments) -> Result<(), Failure> {
                 break enrolment;
             }
         }
-        cancelled.pause(REFRESH_TENTHS);
+        std::thread::sleep(REFRESH);
     };
     bar.finish_and_clear();
     let summary = summary(&arguments.name, begun.enrolment, &ended)?;
