@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::exit::Failure;
-use crate::service::web::people::ErrorStatus;
+use crate::service::web::shapes::ErrorStatus;
 
 /// Longer than any order is waited for.
 const PATIENCE: Duration = Duration::from_secs(6);

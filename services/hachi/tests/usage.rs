@@ -6,7 +6,7 @@ use std::process::Stdio;
 
 use program::{finished, hachi, run};
 
-const COMMANDS: [&[&str]; 8] = [
+const COMMANDS: [&[&str]; 12] = [
     &[],
     &["demo"],
     &["decode"],
@@ -15,6 +15,10 @@ const COMMANDS: [&[&str]; 8] = [
     &["eval", "registration"],
     &["eval", "trajectory"],
     &["doctor"],
+    &["people", "watch"],
+    &["people", "pick"],
+    &["people", "enrol"],
+    &["people", "release"],
 ];
 
 #[test]
@@ -30,7 +34,7 @@ fn every_command_explains_itself_with_an_example() {
 
 #[test]
 fn wrong_usage_ends_with_status_2_and_nothing_on_standard_output() {
-    let wrong: [&[&str]; 8] = [
+    let wrong: [&[&str]; 14] = [
         &[],
         &["dance"],
         &["eval"],
@@ -68,6 +72,12 @@ fn wrong_usage_ends_with_status_2_and_nothing_on_standard_output() {
             "1",
         ],
         &["doctor", "--log", "hachi=verbose"],
+        &["people", "pick"],
+        &["people", "pick", "--track", "3", "--at", "1,2"],
+        &["people", "pick", "--at", "320"],
+        &["people", "pick", "--at", "nan,2"],
+        &["people", "enrol", "Anna"],
+        &["people", "enrol", "Anna", "--live", "--store", "people.db"],
     ];
     for arguments in wrong {
         let run = run(arguments);

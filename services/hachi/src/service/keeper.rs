@@ -10,20 +10,17 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use hachi_hal::Stamp;
 use hachi_people::identify::{AppearanceModel, Calibration};
-use hachi_people::watch::Watch;
 use hachi_runtime::{Bell, Progress, Receiver, Sender, WhenFull, Work, bounded};
 use hachi_store::people::{
     NetworkIdentity, NewPerson, PeopleError, PeopleFile, PersonEntry, StoredId,
 };
 use tracing::{info, warn};
 
+use super::acquaintances::Acquaintances;
 use super::enrolment::Sitting;
-use super::roster::Roster;
 use super::signs::SharedSigns;
 use crate::images;
 
-/// From one time that a person's looks are kept to the next, s. A power cut costs what was learnt since.
-const KEPT_EVERY_S: f64 = 10.0;
 /// How long a change waits for another program's: it comes again in ten seconds.
 const PATIENCE: Duration = Duration::from_millis(200);
 /// Models and news under way.
@@ -304,60 +301,17 @@ enum NotKept {
     Store(PeopleError),
 }
 
-/// Tracking's end: who in the store is whom in view.
-pub struct Acquaintances {
-    looks: Sender<(StoredId, AppearanceModel)>,
-    news: Receiver<News>,
-    /// What became of sittings.
-    pub settled: Receiver<Settled>,
-    kept_at: Option<Stamp>,
-}
-
-impl Acquaintances {
-    /// Takes in what changed in the store.
-    pub fn hear(&mut self, watch: &mut Watch, roster: &mut Roster) {
-        while let Some(news) = self.news.receive() {
-            match news {
-                News::Known(id, model) => {
-                    let person = watch.identifier().enrol(model, None);
-                    roster.add(person, Some(id));
-                }
-                News::Forgotten(gone) => {
-                    if let Some(person) = roster.forget(gone) {
-                        watch.identifier().forget(person);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Has the looks of everybody in view kept, from time to time.
-    pub fn tell(&mut self, watch: &Watch, roster: &Roster, now: Stamp) {
-        let kept_at = *self.kept_at.get_or_insert(now);
-        if now.secs_since(kept_at) < KEPT_EVERY_S {
-            return;
-        }
-        self.kept_at = Some(now);
-        let in_view = watch.statuses().filter(|status| status.unseen_s == 0.0);
-        for status in in_view {
-            let stored = roster.of(status.person).and_then(|known| known.stored);
-            if let (Some(id), Some(model)) = (stored, watch.model(status.person)) {
-                // The oldest one goes where the keeper is behind: only the newest counts.
-                let _ = self.looks.send((id, model.clone()));
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use hachi_people::BoundingBox;
     use hachi_people::identify::IdentifierConfig;
     use hachi_people::observe::Observation;
     use hachi_people::track::{Detection, Features};
+    use hachi_people::watch::Watch;
     use hachi_runtime::{TaskClock, TaskTable, VirtualClock};
     use hachi_store::people::{NewPerson, PeoplePaths};
 
+    use super::super::roster::Roster;
     use super::*;
 
     const LOOKS: [f32; 4] = [0.6, 0.8, 0.0, 0.0];

@@ -29,6 +29,7 @@
 //! the table's numbers, [`settings`] the file they come from, [`eyes`] camera and networks, [`simulator`] the other side of the
 //! wire, [`web`] what is told over HTTP.
 
+pub mod acquaintances;
 pub mod base;
 pub mod behaviour;
 pub mod body;

@@ -11,8 +11,9 @@ use hachi_people::pointing::Meant;
 use hachi_people::watch::Watch;
 use tracing::info;
 
+use super::acquaintances::Acquaintances;
 use super::enrolment::{Enrolment, Stage};
-use super::keeper::{Acquaintances, Settled};
+use super::keeper::Settled;
 use super::messages::{Belt, Looked};
 use super::orders::{Answer, Inbox, NotBegun, Order};
 use super::roster::Roster;

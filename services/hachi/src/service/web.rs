@@ -6,6 +6,8 @@
 //! What a request is, and what it may not be, is `hachi_http`'s.
 
 pub mod people;
+pub mod sentences;
+pub mod shapes;
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};

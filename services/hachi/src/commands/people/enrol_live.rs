@@ -10,7 +10,7 @@ use crate::cli::people::enrolled::PeopleEnrolArguments;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::service::enrolment::Stage;
-use crate::service::web::people::{
+use crate::service::web::shapes::{
     BareOrder, BegunStatus, CancelledStatus, EnrolOrder, EnrolmentStatus, People,
 };
 use crate::service_link::ServiceLink;

@@ -3,7 +3,7 @@
 use crate::cli::people::live::PeoplePickArguments;
 use crate::exit::Failure;
 use crate::output;
-use crate::service::web::people::{PickOrder, PickedStatus};
+use crate::service::web::shapes::{PickOrder, PickedStatus};
 use crate::service_link::ServiceLink;
 
 /// Runs the command.

@@ -3,7 +3,7 @@
 use crate::cli::people::live::PeopleReleaseArguments;
 use crate::exit::Failure;
 use crate::output;
-use crate::service::web::people::{BareOrder, ReleasedStatus};
+use crate::service::web::shapes::{BareOrder, ReleasedStatus};
 use crate::service_link::ServiceLink;
 
 /// Runs the command.

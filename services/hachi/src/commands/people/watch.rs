@@ -7,7 +7,7 @@ use crate::cli::people::live::PeopleWatchArguments;
 use crate::exit::Failure;
 use crate::interrupt::Cancelled;
 use crate::output;
-use crate::service::web::people::People;
+use crate::service::web::shapes::People;
 use crate::service_link::ServiceLink;
 use crate::task_table::CLEAR;
 
@@ -109,7 +109,7 @@ fn shown(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::service::web::people::{BoxStatus, InViewStatus, KnownStatus};
+    use crate::service::web::shapes::{BoxStatus, InViewStatus, KnownStatus};
 
     #[test]
     fn everybody_stands_on_a_line_and_who_is_known_has_their_number() {

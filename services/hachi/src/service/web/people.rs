@@ -2,8 +2,9 @@
 //!
 //! In: requests of callers on this computer, what tracking and the keeper left. Out: [`People`] as JSON,
 //! or what became of an order. Names are told here and nowhere else. Whoever calls from elsewhere is
-//! refused, and so is what a web page may have sent (`hachi_http::guard`): SPEC asks for a token and TLS
-//! beyond loopback, and there is neither.
+//! refused, because a token and TLS would be needed for that and there is neither; and so is what a web
+//! page may have sent (`hachi_http::guard`). Elsewhere: the JSON itself ([`shapes`](super::shapes)), and
+//! the sentences ([`sentences`](super::sentences)).
 //!
 //! | request | body | does |
 //! |---|---|---|
@@ -17,14 +18,19 @@ use std::time::{Duration, Instant};
 
 use hachi_hal::Clock;
 use hachi_http::{Method, Request, Response, guard};
-use hachi_people::pointing::{NotPicked, Pointed};
+use hachi_people::pointing::Pointed;
 use hachi_store::people::{StoredId, check_form_of_name};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use tracing::info;
 
-use crate::service::enrolment::{self, Stage};
+use super::sentences::{Refused, advice, json, none, not_begun, said};
+use super::shapes::{
+    BareOrder, BoxStatus, EnrolOrder, EnrolmentStatus, ErrorStatus, InViewStatus, KnownStatus,
+    People, PickOrder, PictureStatus,
+};
+use crate::service::enrolment;
 use crate::service::keeper::Names;
-use crate::service::orders::{Answer, NoAnswer, NotBegun, Order};
+use crate::service::orders::{NotBegun, Order};
 use crate::service::people::{NoPeople, PeopleDesk};
 use crate::service::view::View;
 
@@ -38,177 +44,6 @@ const AT_ONCE: u32 = 5;
 const EVERY: Duration = Duration::from_millis(500);
 /// A place in a picture is not further away, pixels.
 const FARTHEST: f64 = 1e5;
-
-/// What `GET /people` says.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct People {
-    /// The last picture that was looked at; `None` before the first one.
-    pub picture: Option<PictureStatus>,
-    /// Everybody in view.
-    pub in_view: Vec<InViewStatus>,
-    /// Everybody whom the robot knows.
-    pub known: Vec<KnownStatus>,
-    /// The enrolment that goes on, or the last one.
-    pub enrolment: Option<EnrolmentStatus>,
-}
-
-/// The last picture.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PictureStatus {
-    /// The middle of its exposure on the robot's clock, nanoseconds.
-    pub stamp_ns: i64,
-    /// How long that is ago, seconds.
-    pub age_s: f64,
-    /// Pixels.
-    pub width: usize,
-    /// Pixels.
-    pub height: usize,
-}
-
-/// Somebody in view.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct InViewStatus {
-    /// The track's number.
-    pub track: u64,
-    /// Where, pixels.
-    #[serde(rename = "box")]
-    pub bounding_box: BoxStatus,
-    /// Whether they are believed to be a person.
-    pub confirmed: bool,
-    /// Time since they were seen: 0 if in this picture, seconds.
-    pub unseen_s: f64,
-}
-
-/// A rectangle in the picture, pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BoxStatus {
-    /// Its left edge.
-    pub left: f64,
-    /// Its upper edge.
-    pub top: f64,
-    /// From left to right.
-    pub width: f64,
-    /// From top to bottom.
-    pub height: f64,
-}
-
-/// Somebody whom the robot knows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct KnownStatus {
-    /// Their number while the service runs.
-    pub number: u32,
-    /// What they are called, if they are in the store.
-    pub name: Option<String>,
-    /// Whether they are the robot's person.
-    pub picked: bool,
-    /// `SEEN`, `FOUND`, `UNSURE`, `LOST` or `SEARCHING`.
-    pub condition: String,
-    /// How much they look like themselves, 0 to 1.
-    pub confidence: f64,
-    /// Their track, while they are in view.
-    pub track: Option<u64>,
-    /// Since when they are not in view, seconds.
-    pub unseen_s: f64,
-}
-
-/// An enrolment.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EnrolmentStatus {
-    /// Its number.
-    pub number: u32,
-    /// How far it is.
-    pub stage: Stage,
-    /// Looks taken.
-    pub taken: usize,
-    /// Looks wanted.
-    pub wanted: usize,
-    /// When it ends by itself, seconds.
-    pub left_s: f64,
-    /// The number of the person, once they are known.
-    pub person: Option<u32>,
-    /// What there is to be done, in a sentence.
-    pub advice: String,
-}
-
-/// An order to pick somebody.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PickOrder {
-    /// A track's number,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub track: Option<u64>,
-    /// or a place in the picture, pixels.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub at: Option<[f64; 2]>,
-}
-
-/// An order to enrol somebody.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EnrolOrder {
-    /// What to call them.
-    pub name: String,
-}
-
-/// An order that needs no more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BareOrder {}
-
-/// Somebody is the robot's person.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PickedStatus {
-    /// Their track.
-    pub track: u64,
-    /// Their number.
-    pub person: u32,
-    /// Whether the robot knew them before.
-    pub known: bool,
-}
-
-/// An enrolment has begun.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BegunStatus {
-    /// Its number.
-    pub enrolment: u32,
-    /// Looks wanted.
-    pub wanted: usize,
-}
-
-/// The enrolment is over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CancelledStatus {
-    /// Whether there was one.
-    pub cancelled: bool,
-}
-
-/// The robot has no person any more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ReleasedStatus {
-    /// Who was it, if somebody was.
-    pub released: Option<u32>,
-}
-
-/// Why something was not done, and what to do.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ErrorStatus {
-    /// In a sentence.
-    pub error: String,
-}
-
-/// What was not done: status and sentence.
-type Refused = (u16, String);
 
 /// The page.
 pub struct PeoplePage {
@@ -346,30 +181,12 @@ impl PeoplePage {
                     false => progress.ends.secs_since(now).max(0.0),
                 },
                 person: progress.person,
-                advice: self.advice(progress.number, progress.stage),
+                advice: {
+                    let failed = self.failed.as_ref().filter(|(n, _)| *n == progress.number);
+                    advice(progress.stage, failed.map(|(_, why)| &**why))
+                },
             }),
         })
-    }
-
-    fn advice(&self, number: u32, stage: Stage) -> String {
-        let failed = self.failed.as_ref().filter(|(n, _)| *n == number);
-        match (stage, failed) {
-            (Stage::Taking, _) => "turn round slowly in front of the robot",
-            (Stage::WaitsForPerson, _) => "stand in front of the robot, in full view",
-            (Stage::WaitsForOthersToGo, _) => "everybody else goes out of the picture's middle",
-            (Stage::Keeping, _) => "model and pictures are being kept",
-            (Stage::Done, _) => "they are known",
-            (Stage::TimedOut, _) => {
-                "it took too long: stand alone in front of the robot, in full view, and begin again"
-            }
-            (Stage::WentAway, _) => {
-                "the person went out of view: stay in front of the robot, and begin again"
-            }
-            (Stage::Cancelled, _) => "it was cancelled, and nothing is kept",
-            (Stage::Failed, Some((_, why))) => why,
-            (Stage::Failed, None) => "nothing is kept: see the log, and begin again",
-        }
-        .to_owned()
     }
 
     fn order(&mut self, request: &Request<'_>) -> Result<Response, Refused> {
@@ -418,12 +235,6 @@ impl PeoplePage {
     }
 }
 
-fn json(status: u16, value: &impl Serialize) -> Result<Response, Refused> {
-    let body = serde_json::to_string(value);
-    let body = body.map_err(|error| (500, format!("{error}: please report this")))?;
-    Ok(Response::json(status, body))
-}
-
 fn body<'a, T: Deserialize<'a>>(request: &Request<'a>) -> Result<T, Refused> {
     serde_json::from_slice(request.body)
         .map_err(|error| (400, format!("the order can't be read: {error}")))
@@ -439,96 +250,6 @@ fn pointed(order: &PickOrder) -> Result<Pointed, Refused> {
             "give either track, a number, or at, a place in pixels".to_owned(),
         )),
     }
-}
-
-/// Why nobody is looked for.
-fn none(why: NoPeople) -> Refused {
-    let what = match why {
-        NoPeople::NotAskedFor => {
-            "people are not looked for: set people.enabled = true in the settings, and start the \
-             service again"
-        }
-        NoPeople::NoNetworks => {
-            "people are not looked for, for want of a network: see the log, name one as \
-             people.detector in the settings, and start the service again"
-        }
-    };
-    (503, what.to_owned())
-}
-
-fn not_begun(why: NotBegun) -> Refused {
-    match why {
-        NotBegun::Nobody => (
-            409,
-            "nobody stands in front of the robot: stand near the middle of its picture, in full view"
-                .to_owned(),
-        ),
-        NotBegun::Several(count) => (
-            409,
-            format!("{count} people stand in front of the robot: one alone can be enrolled"),
-        ),
-        NotBegun::Busy => (
-            409,
-            "somebody is being enrolled already: wait, or cancel that first".to_owned(),
-        ),
-        NotBegun::NoStore => (
-            503,
-            "there is nowhere to keep anybody: name a file as people.store in the settings, see in \
-             the log that it can be opened, and start the service again"
-                .to_owned(),
-        ),
-    }
-}
-
-fn said(answer: Result<Answer, NoAnswer>) -> Result<Response, Refused> {
-    match answer {
-        Ok(Answer::Picked {
-            track,
-            person,
-            known,
-        }) => json(
-            200,
-            &PickedStatus {
-                track,
-                person,
-                known,
-            },
-        ),
-        Ok(Answer::Begun(enrolment)) => json(
-            202,
-            &BegunStatus {
-                enrolment,
-                wanted: enrolment::WANTED,
-            },
-        ),
-        Ok(Answer::Cancelled(cancelled)) => json(200, &CancelledStatus { cancelled }),
-        Ok(Answer::Released(released)) => json(200, &ReleasedStatus { released }),
-        Ok(Answer::NotBegun(why)) => Err(not_begun(why)),
-        Ok(Answer::NotPicked(why)) => Err(not_picked(why)),
-        Err(NoAnswer::Full) => Err((
-            503,
-            "too many orders wait to be carried out: is the camera there? Try again later".to_owned(),
-        )),
-        Err(NoAnswer::Withdrawn) => Err((
-            503,
-            "no picture came in time, and the order was withdrawn: see in /health whether the camera \
-             is there"
-                .to_owned(),
-        )),
-        Err(NoAnswer::Unknown) => Err((
-            503,
-            "nothing was heard of the order: see in /people what became of it".to_owned(),
-        )),
-    }
-}
-
-fn not_picked(why: NotPicked) -> Refused {
-    let (status, next_step) = match why {
-        NotPicked::NoSuchTrack => (404, "see in /people who is in view"),
-        NotPicked::NobodyThere => (404, "point at the middle of somebody in the last picture"),
-        _ => (409, "wait until they are in full view"),
-    };
-    (status, format!("{why}: {next_step}"))
 }
 
 /// How many orders may come.
