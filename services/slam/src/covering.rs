@@ -40,6 +40,10 @@ const MOST_CHI2: f64 = 22.46;
 const LEAST_OVERLAP: f64 = 0.9;
 const LEAST_INLIERS: f64 = 0.85;
 
+/// A node is old after the way that makes a place seen again a loop, or after so many others: a robot
+/// that turns on the spot goes no way.
+const OLD_AFTER: u32 = 12;
+
 /// Surfaces farther away are seen by a few rays only, and others every time, metres.
 const REACH_M: f32 = 50.0;
 const LOOKED_AT_M: f32 = 20.0;
@@ -160,6 +164,7 @@ impl Covering {
         let is_old = |n: &Node| {
             n.session != arrival.session
                 || arrival.grown.path_m - n.path_m >= config.loop_least_way_m
+                || arrival.anchor.made.0 >= n.id.0.saturating_add(OLD_AFTER)
         };
         let here = map_from_submap.translation.vector;
         self.old.clear();

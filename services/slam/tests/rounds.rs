@@ -93,6 +93,22 @@ fn what_is_new_at_a_known_place_gets_a_node_and_only_one_round_of_them() {
     assert!(after - with_it <= 1, "{with_it} then {after}");
 }
 
+#[test]
+fn a_robot_that_turns_on_the_spot_makes_nodes_for_a_few_turns_and_then_none() {
+    let mut walker = walker(true, Box::new(MemoryStore::default()));
+    walker.walk(5.0);
+    let before = walker.slam.map().nodes().len();
+    (walker.step_m, walker.turn_rad) = (0.0, 0.1);
+    for _ in 0..12 * 63 {
+        let estimate = walker.step();
+        let (metres, radians) = walker.off_m(&estimate);
+        assert!(metres < 0.1 && radians < 0.03, "{metres} m, {radians} rad");
+    }
+    // A node for every 1.2 rad would be 63.
+    let turned = walker.slam.map().nodes().len() - before;
+    assert!(turned <= 18, "{turned}");
+}
+
 /// Keeps a map as a file would.
 #[derive(Clone, Default)]
 struct Kept {

@@ -116,6 +116,10 @@ pub struct Walker {
     /// Where odometry has it.
     pub odom_from_base: Pose,
     scans: i64,
+    /// How far it goes with each step, and turns, to the left.
+    pub step_m: f64,
+    pub turn_rad: f64,
+    heading_rad: f64,
     /// What odometry adds to each step.
     drift: Pose,
 }
@@ -130,6 +134,9 @@ impl Walker {
             way_m: 0.5,
             odom_from_base: Pose::identity(),
             scans: 0,
+            step_m: STEP_M,
+            turn_rad: 0.0,
+            heading_rad: 0.0,
             drift: Pose::from_parts(
                 Vector3::new(0.0003, 0.0002, 0.0).into(),
                 Rotation::from_euler_angles(0.0, 0.0, 0.00012),
@@ -161,11 +168,17 @@ impl Walker {
         self.slam.step(&scan, &mut self.events)
     }
 
-    /// A step of 10 cm and a scan.
+    /// Where the robot is.
+    fn pose(&self) -> Pose {
+        truth(self.way_m) * Rotation::from_euler_angles(0.0, 0.0, self.heading_rad)
+    }
+
+    /// A step, of 10 cm unless set otherwise, and a scan.
     pub fn step(&mut self) -> SlamEstimate {
-        let before = truth(self.way_m);
-        self.way_m += STEP_M;
-        let moved = before.inv_mul(&truth(self.way_m));
+        let before = self.pose();
+        self.way_m += self.step_m;
+        self.heading_rad += self.turn_rad;
+        let moved = before.inv_mul(&self.pose());
         self.odom_from_base = self.odom_from_base * moved * self.drift;
         self.scan(Condition::Ok)
     }
@@ -178,7 +191,7 @@ impl Walker {
     }
 
     fn look(&mut self) {
-        let pose = truth(self.way_m);
+        let pose = self.pose();
         let eye = pose.translation.vector;
         for ring in 0..16 {
             let (sin_up, cos_up) = (f64::from(2 * ring - 15)).to_radians().sin_cos();
@@ -198,7 +211,7 @@ impl Walker {
 
     /// How far an estimate is from the truth: metres, radians.
     pub fn off_m(&self, estimate: &SlamEstimate) -> (f64, f64) {
-        let truth = truth(0.5).inv_mul(&truth(self.way_m));
+        let truth = truth(0.5).inv_mul(&self.pose());
         let off = truth.inv_mul(&estimate.map_from_base);
         (off.translation.vector.norm(), off.rotation.angle())
     }
