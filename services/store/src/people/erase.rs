@@ -12,6 +12,10 @@ use super::PeopleError;
 use super::file::PeopleFile;
 use super::person::{PersonEntry, StoredId};
 
+/// The log is tried to be emptied so often, and after such a pause.
+const CHECKPOINTS: u32 = 20;
+const BETWEEN: std::time::Duration = std::time::Duration::from_millis(20);
+
 impl PeopleFile {
     /// Forgets a person: when this is done nothing of them is left in the store, the log beside it, or
     /// the key file.
@@ -86,12 +90,22 @@ impl PeopleFile {
             change.run(orphans, [])?;
             Ok(())
         })?;
-        let anew = || -> rusqlite::Result<bool> {
-            self.connection.execute_batch("VACUUM")?;
+        let empty_log = || -> rusqlite::Result<bool> {
             let checkpoint = "PRAGMA wal_checkpoint(TRUNCATE)";
             self.connection.query_row(checkpoint, [], |row| {
                 row.get::<_, i64>(0).map(|busy| busy != 0)
             })
+        };
+        let anew = || -> rusqlite::Result<bool> {
+            self.connection.execute_batch("VACUUM")?;
+            // One that meets another program's does not wait for it, whatever the patience.
+            for _ in 1..CHECKPOINTS {
+                if !empty_log()? {
+                    return Ok(false);
+                }
+                std::thread::sleep(BETWEEN);
+            }
+            empty_log()
         };
         if anew().map_err(|error| self.problem(&error))? {
             return Err(PeopleError::InUse {
