@@ -14,6 +14,7 @@ pub mod condition;
 pub mod config;
 pub mod measured;
 pub mod motion;
+mod news;
 pub mod odometry;
 pub mod scale;
 pub mod search;

@@ -12,6 +12,7 @@ use crate::condition::{Condition, Doubt};
 use crate::config::OdometryConfig;
 use crate::measured::{GyroBias, from_gyroscope, from_odometry};
 use crate::motion::ScanMotion;
+use crate::news::News;
 use crate::scale::Scale;
 use crate::search::Search;
 use crate::timing::Timing;
@@ -39,15 +40,6 @@ const SETTLED: usize = 3;
 /// Points of one scan that the map takes in, evenly picked: a 64-beam scan has more than its cells
 /// can tell apart.
 const REMEMBERED_POINTS: usize = 40_000;
-
-/// Nothing new is seen from less far away than this, and while the robot stands scans become the map
-/// only so often: cells beside it are filled by one scan, and a map made of the last few scans moves
-/// along with whatever pulls on them. A robot that stood in a doorway for half a minute drifted by
-/// 10 cm. A map's first scans are always news.
-const FIRST_SCANS: u32 = 12;
-const NEWS_M: f64 = 0.04;
-const NEWS_RAD: f64 = 0.02;
-const NEWS_NS: i64 = 2_000_000_000;
 
 /// The map's origin follows when the robot is this far from it: single precision keeps 0.03 mm.
 const ORIGIN_RANGE_M: f64 = 500.0;
@@ -139,8 +131,7 @@ pub struct Odometry {
     usual_fit_share: f64,
     good_fits: usize,
     misfits: usize,
-    /// Where and when the scan was taken that became the map last.
-    remembered: Option<(Pose, Stamp)>,
+    news: News,
     tidied_at: Vector3,
 }
 
@@ -173,7 +164,7 @@ impl Odometry {
             usual_fit_share: 0.8,
             good_fits: 1,
             misfits: 0,
-            remembered: None,
+            news: News::default(),
             tidied_at: Vector3::zeros(),
             config,
         }
@@ -221,7 +212,8 @@ impl Odometry {
         self.usual_fit_share += rate * (fitting - self.usual_fit_share);
         self.learn_agility(&timing, searched);
         self.learn_bias(&timing);
-        if self.sees_news(input.header.end) {
+        let (pose, end) = (self.chain.last(), input.header.end);
+        if self.news.are_seen(self.map.scans(), pose, end) {
             self.remember(input, &timing);
         }
         self.scale.follow(self.source.len());
@@ -479,17 +471,6 @@ impl Odometry {
         self.estimate(stamp, condition, Fit::default(), true)
     }
 
-    /// Whether the scan shows more than the last one that became the map.
-    fn sees_news(&self, end: Stamp) -> bool {
-        self.map.scans() < FIRST_SCANS
-            || self.remembered.is_none_or(|(pose, stamp)| {
-                let moved = pose.inv_mul(self.chain.last());
-                moved.translation.vector.norm() >= NEWS_M
-                    || moved.rotation.angle() >= NEWS_RAD
-                    || end.nanos_since(stamp) >= NEWS_NS
-            })
-    }
-
     /// Adds the scan, deskewed by what was found, to the map.
     fn remember(&mut self, input: &ScanInput<'_>, timing: &Timing) {
         if timing.has_point_times && self.chain.poses().len() > 1 {
@@ -509,7 +490,7 @@ impl Odometry {
             };
             (rotation * nalgebra::Vector3::from(p) + shift).into()
         }));
-        self.remembered = Some((*self.chain.last(), input.header.end));
+        self.news.remember(*self.chain.last(), input.header.end);
         self.tidy();
     }
 
@@ -536,9 +517,7 @@ impl Odometry {
             let shift = cells * edge;
             self.chain.translate(&-shift);
             self.agility.translate(&-shift);
-            if let Some((pose, _)) = &mut self.remembered {
-                pose.translation.vector -= shift;
-            }
+            self.news.translate(&-shift);
             self.origin += shift;
             self.tidied_at -= shift;
         }

@@ -280,13 +280,11 @@ fn look(track: &Track, looked: &Looked) -> Option<(Vec<f32>, Rgb)> {
 #[cfg(test)]
 mod tests {
     use hachi_hal::Stamp;
-    use hachi_people::BoundingBox;
     use hachi_people::identify::IdentifierConfig;
-    use hachi_people::observe::Observation;
-    use hachi_people::track::Detection;
     use hachi_people::watch::Watch;
     use hachi_runtime::{Receiver, TaskClock, TaskTable, VirtualClock, WhenFull, bounded};
 
+    use super::super::test_people::{observation, person_at};
     use super::*;
 
     const MS: i64 = 1_000_000;
@@ -320,26 +318,11 @@ mod tests {
 
         /// So many pictures of people with their middles there.
         fn see(&mut self, pictures: usize, middles: &[f64]) {
-            let box_at = |middle: f64| BoundingBox::new(middle - 20.0, 40.0, 40.0, 100.0);
-            let detections: Vec<_> = middles
-                .iter()
-                .map(|middle| Detection {
-                    bounding_box: box_at(*middle),
-                    score: 0.95,
-                })
-                .collect();
+            let detections: Vec<_> = middles.iter().map(|m| person_at(m - 20.0, 40.0)).collect();
             let values = [1.0, 0.5].repeat(middles.len());
             for _ in 0..pictures {
                 self.now = self.now + 100 * MS;
-                let observed = Observation {
-                    detections: &detections,
-                    features: Some(Features {
-                        dimension: 2,
-                        values: &values,
-                        same_person_distance: 0.4,
-                    }),
-                    columns: None,
-                };
+                let observed = observation(&detections, &values);
                 self.watch.step(&observed, 0.1);
                 self.looked.keep(&observed);
                 self.looked.picture.stamp = self.now;

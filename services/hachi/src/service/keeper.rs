@@ -303,15 +303,13 @@ enum NotKept {
 
 #[cfg(test)]
 mod tests {
-    use hachi_people::BoundingBox;
     use hachi_people::identify::IdentifierConfig;
-    use hachi_people::observe::Observation;
-    use hachi_people::track::{Detection, Features};
     use hachi_people::watch::Watch;
     use hachi_runtime::{TaskClock, TaskTable, VirtualClock};
     use hachi_store::people::{NewPerson, PeoplePaths};
 
     use super::super::roster::Roster;
+    use super::super::test_people::{observation, person_at};
     use super::*;
 
     const LOOKS: [f32; 4] = [0.6, 0.8, 0.0, 0.0];
@@ -383,22 +381,10 @@ mod tests {
 
         /// Somebody who looks like this is in view for so many seconds.
         fn see(&mut self, looks: [f32; 4], seconds: u32) {
-            let detections = [Detection {
-                bounding_box: BoundingBox::new(10.0, 10.0, 40.0, 100.0),
-                score: 0.95,
-            }];
+            let detections = [person_at(10.0, 10.0)];
             for _ in 0..5 * seconds {
                 self.now = self.now + 200_000_000;
-                let seen = Observation {
-                    detections: &detections,
-                    features: Some(Features {
-                        dimension: 4,
-                        values: &looks,
-                        same_person_distance: 0.4,
-                    }),
-                    columns: None,
-                };
-                self.watch.step(&seen, 0.2);
+                self.watch.step(&observation(&detections, &looks), 0.2);
                 self.acquaintances.tell(&self.watch, &self.roster, self.now);
             }
         }

@@ -59,6 +59,8 @@ pub mod simulated;
 pub mod simulator;
 pub mod slam;
 pub mod supervisor;
+#[cfg(test)]
+mod test_people;
 pub mod tracking;
 pub mod view;
 pub mod web;

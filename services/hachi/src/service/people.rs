@@ -24,7 +24,6 @@ use super::keeper::{NamedEnd, keeper};
 use super::messages::{BeltEnd, Looked, Picture, belt};
 use super::orders::{Desk, orders};
 use super::reception::Reception;
-use super::roster::Roster;
 use super::rows;
 use super::settings::row;
 use super::signs::SharedSigns;
@@ -98,28 +97,16 @@ pub fn open(
     let waiting = inbox.gauge();
     // Of what is known only the newest counts: that the rest goes is no loss, and is not told.
     let (views, views_end) = belt::<View>(table, "views", 1, &nobody);
-    let (mut acquaintances, mut named) = (None, None);
-    let enrolment = match people.kept {
-        Some(kept) => {
-            let ends = keeper(kept, &to_tracking, &nobody, Arc::clone(signs));
-            let (spec, bell) = (row(settings, rows::KEEPER), table.bell());
-            table.add(spec, bell, vec![], Box::new(ends.keeper));
-            (acquaintances, named) = (Some(ends.acquaintances), Some(ends.named));
-            Some(Enrolment::new(ends.sittings))
-        }
-        None => None,
-    };
-    let reception = Reception {
-        roster: Roster::default(),
-        inbox,
-        acquaintances,
-        enrolment,
-        views,
-        shown: None,
-        nobody_since: None,
-        said: None,
-        signs: Arc::clone(signs),
-    };
+    let mut reception = Reception::new(inbox, views, Arc::clone(signs));
+    let named = people.kept.map(|kept| {
+        let ends = keeper(kept, &to_tracking, &nobody, Arc::clone(signs));
+        let (spec, bell) = (row(settings, rows::KEEPER), table.bell());
+        table.add(spec, bell, vec![], Box::new(ends.keeper));
+        reception.acquaintances = Some(ends.acquaintances);
+        reception.enrolment = Some(Enrolment::new(ends.sittings));
+        ends.named
+    });
+
     let watch = Watch::new(people.observer.even_score(), settings.people.identify);
     let gauges = vec![pictures_end.full.gauge()];
     let detection = Detection {

@@ -28,24 +28,39 @@ pub struct Reception {
     /// Who is known.
     pub roster: Roster,
     /// Orders.
-    pub inbox: Inbox,
+    inbox: Inbox,
     /// Who in the store is whom in view; `None` without a store.
     pub acquaintances: Option<Acquaintances>,
     /// Who is being enrolled; nobody can be without a store.
     pub enrolment: Option<Enrolment>,
     /// What is known, for the page.
-    pub views: Belt<View>,
+    views: Belt<View>,
     /// The last picture.
-    pub shown: Option<Shown>,
+    shown: Option<Shown>,
     /// Since when an enrolment waits for somebody to be seen in front.
-    pub nobody_since: Option<Stamp>,
+    nobody_since: Option<Stamp>,
     /// What was last said of the enrolment.
-    pub said: Option<(u32, Stage)>,
+    said: Option<(u32, Stage)>,
     /// Where it is left that somebody is being enrolled.
-    pub signs: SharedSigns,
+    signs: SharedSigns,
 }
 
 impl Reception {
+    /// One without a store.
+    pub fn new(inbox: Inbox, views: Belt<View>, signs: SharedSigns) -> Self {
+        Self {
+            roster: Roster::default(),
+            inbox,
+            acquaintances: None,
+            enrolment: None,
+            views,
+            shown: None,
+            nobody_since: None,
+            said: None,
+            signs,
+        }
+    }
+
     /// Takes in news of the keeper and orders that need no picture.
     pub fn hear(&mut self, watch: &mut Watch, now: Stamp) {
         if let Some(acquaintances) = &mut self.acquaintances {
@@ -201,18 +216,15 @@ impl Reception {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
     use std::time::Duration;
 
-    use hachi_people::BoundingBox;
     use hachi_people::identify::{AppearanceModel, Condition, IdentifierConfig};
-    use hachi_people::observe::Observation;
-    use hachi_people::track::{Detection, Features};
     use hachi_runtime::{TaskClock, TaskTable, VirtualClock, WhenFull, bounded};
     use hachi_store::people::{NetworkIdentity, NewPerson, PeopleFile, PeoplePaths, StoredId};
 
     use super::super::messages::belt;
     use super::super::orders::orders;
+    use super::super::test_people::{observation, person_at};
     use super::*;
 
     const LOOKS: [f32; 2] = [1.0, 0.5];
@@ -243,15 +255,8 @@ mod tests {
             looked.picture.rgb = vec![7; 3 * 400 * 200];
             Self {
                 reception: Reception {
-                    roster: Roster::default(),
-                    inbox,
-                    acquaintances: None,
                     enrolment: Some(Enrolment::new(sittings)),
-                    views,
-                    shown: None,
-                    nobody_since: None,
-                    said: None,
-                    signs: Arc::default(),
+                    ..Reception::new(inbox, views, SharedSigns::default())
                 },
                 watch: Watch::new(0.5, IdentifierConfig::default()),
                 looked,
@@ -264,18 +269,8 @@ mod tests {
         fn see(&mut self, pictures: usize) {
             for _ in 0..pictures {
                 self.now = self.now + 100_000_000;
-                let observed = Observation {
-                    detections: &[Detection {
-                        bounding_box: BoundingBox::new(180.0, 40.0, 40.0, 100.0),
-                        score: 0.95,
-                    }],
-                    features: Some(Features {
-                        dimension: 2,
-                        values: &LOOKS,
-                        same_person_distance: 0.4,
-                    }),
-                    columns: None,
-                };
+                let detections = [person_at(180.0, 40.0)];
+                let observed = observation(&detections, &LOOKS);
                 self.watch.step(&observed, 0.1);
                 self.looked.keep(&observed);
                 self.looked.picture.stamp = self.now;

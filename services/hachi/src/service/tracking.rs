@@ -101,16 +101,13 @@ mod tests {
     use std::thread::JoinHandle;
     use std::time::Duration;
 
-    use hachi_people::BoundingBox;
     use hachi_people::identify::IdentifierConfig;
-    use hachi_people::observe::Observation;
     use hachi_people::pointing::Pointed;
-    use hachi_people::track::{Detection, Features};
     use hachi_runtime::{TaskTable, VirtualClock};
 
     use super::super::messages::{Belt, belt};
     use super::super::orders::{Answer, Desk, Order, orders};
-    use super::super::roster::Roster;
+    use super::super::test_people::{observation, person_at};
     use super::super::view::View;
     use super::*;
 
@@ -134,17 +131,7 @@ mod tests {
             let (views, views_end) = belt::<View>(&table, "views", 1, &nobody);
             let (desk, inbox) = orders(&nobody, &nobody, Duration::from_secs(60));
             let signs = SharedSigns::default();
-            let reception = Reception {
-                roster: Roster::default(),
-                inbox,
-                acquaintances: None,
-                enrolment: None,
-                views,
-                shown: None,
-                nobody_since: None,
-                said: None,
-                signs: Arc::clone(&signs),
-            };
+            let reception = Reception::new(inbox, views, Arc::clone(&signs));
             let tracking = Tracking {
                 watch: Watch::new(0.5, IdentifierConfig::default()),
                 looked: looked_end,
@@ -169,22 +156,10 @@ mod tests {
         fn see(&mut self, lefts: &[f64]) {
             self.now = self.now + 100_000_000;
             self.clock.advance_to(self.now);
-            let detection = |left: &f64| Detection {
-                bounding_box: BoundingBox::new(*left, 0.0, 40.0, 100.0),
-                score: 0.97,
-            };
-            let detections: Vec<_> = lefts.iter().map(detection).collect();
+            let detections: Vec<_> = lefts.iter().map(|left| person_at(*left, 0.0)).collect();
             let mut looked = self.looked.empty.receive().unwrap();
             looked.picture.stamp = self.now;
-            looked.keep(&Observation {
-                detections: &detections,
-                features: Some(Features {
-                    dimension: 2,
-                    values: &[1.0, 0.1].repeat(lefts.len()),
-                    same_person_distance: 0.3,
-                }),
-                columns: None,
-            });
+            looked.keep(&observation(&detections, &[1.0, 0.1].repeat(lefts.len())));
             self.looked.send(looked);
             self.tracking.run(self.now);
         }

@@ -161,7 +161,7 @@ impl Identifier {
             person.begin(tracks, look, dt_s);
         }
         for person in &mut self.people {
-            person.stay(tracks, look, self.config.adapts, (dt_s, columns));
+            person.stay(tracks, look, self.config.adapts, dt_s, columns);
         }
         self.search(tracks, look);
         for person in &mut self.people {

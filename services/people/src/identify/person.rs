@@ -102,7 +102,8 @@ impl Person {
         tracks: &[Track],
         look: impl Fn(&Track) -> Option<&'a [f32]> + Copy,
         adapts: bool,
-        (dt_s, columns): (f64, Option<usize>),
+        dt_s: f64,
+        columns: Option<usize>,
     ) {
         let own = tracks
             .iter()
