@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 
 /// Which service is asked.
 #[derive(Debug, Clone, Args)]
@@ -35,6 +35,7 @@ pub struct PeopleWatchArguments {
 
 /// Arguments of `hachi people pick`.
 #[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("whom").required(true))]
 #[command(after_help = "\
 From then on the robot knows this person, whatever becomes of the track; who was its person before is it \
 no more. Where the robot is UNSURE which of two people is its own, picking one says so.
@@ -44,15 +45,10 @@ Example:
   hachi people pick --at 320,180")]
 pub struct PeoplePickArguments {
     /// The number of their track, as `hachi people watch` shows it.
-    #[arg(
-        long,
-        value_name = "N",
-        required_unless_present = "at",
-        conflicts_with = "at"
-    )]
+    #[arg(long, value_name = "N", group = "whom")]
     pub track: Option<u64>,
     /// A place in the picture that they cover, pixels from its left upper corner.
-    #[arg(long, value_name = "X,Y", value_parser = place)]
+    #[arg(long, value_name = "X,Y", value_parser = place, group = "whom")]
     pub at: Option<Place>,
     /// Print one JSON object.
     #[arg(long)]
